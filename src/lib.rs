@@ -1,0 +1,10 @@
+//! Soft tissue of the human face: from a head CT to skin that moves.
+//!
+//! The walk: a *scene* (one TOML file) and a *mesh* become an immutable [`Model`]; a [`Sim`] moves it step by step.
+//! The same `Sim` stands behind the C library, the FMI 2.0/3.0 component and the command line.
+#![deny(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod math;
+pub mod mesh;
+pub mod port;
