@@ -5,6 +5,7 @@
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod geometry;
 pub mod math;
 pub mod mesh;
 pub mod port;

@@ -1,0 +1,4 @@
+//! Geometry and io: shapes in, meshes out, and back again.
+mod geometry {
+    mod block;
+}
