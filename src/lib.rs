@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 pub mod geometry;
+pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod port;
