@@ -73,20 +73,13 @@ impl<'a> Reader<'a> {
     /// [`Truncated`], as for every method here.
     pub fn raw(&mut self, n: usize) -> Result<&'a [u8], Truncated> {
         if n > self.left() {
-            return Err(Truncated {
-                at: self.at,
-                wanted: n,
-                left: self.left(),
-            });
+            return Err(Truncated { at: self.at, wanted: n, left: self.left() });
         }
         self.at += n;
         Ok(&self.bytes[self.at - n..self.at])
     }
     fn array<const N: usize>(&mut self) -> Result<[u8; N], Truncated> {
-        Ok(self
-            .raw(N)?
-            .try_into()
-            .expect("raw returns as many bytes as asked"))
+        Ok(self.raw(N)?.try_into().expect("raw returns as many bytes as asked"))
     }
     /// An unsigned 32-bit number.
     pub fn u32(&mut self) -> Result<u32, Truncated> {
@@ -99,16 +92,9 @@ impl<'a> Reader<'a> {
     /// A count of items of `size` bytes each, of which that many must follow.
     pub fn len(&mut self, size: usize) -> Result<usize, Truncated> {
         let n = u64::from_le_bytes(self.array()?);
-        let wanted = usize::try_from(n)
-            .ok()
-            .and_then(|n| n.checked_mul(size))
-            .unwrap_or(usize::MAX);
+        let wanted = usize::try_from(n).ok().and_then(|n| n.checked_mul(size)).unwrap_or(usize::MAX);
         if wanted > self.left() {
-            return Err(Truncated {
-                at: self.at,
-                wanted,
-                left: self.left(),
-            });
+            return Err(Truncated { at: self.at, wanted, left: self.left() });
         }
         Ok(n as usize)
     }

@@ -9,6 +9,8 @@ pub mod bytes;
 pub mod effect;
 pub mod energy;
 pub mod fem;
+pub mod geometry;
+pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod port;

@@ -75,9 +75,7 @@ pub enum MeshError {
         z: f64,
     },
     /// A tetrahedron is flat or turned inside out.
-    #[error(
-        "tetrahedron {tet} has rest volume {volume:.3e} m3; every rest volume must be positive ({count} are not)"
-    )]
+    #[error("tetrahedron {tet} has rest volume {volume:.3e} m3; every rest volume must be positive ({count} are not)")]
     Inverted {
         /// First such tetrahedron.
         tet: usize,
@@ -120,10 +118,7 @@ impl TetMesh {
     pub fn checked(self) -> Result<Self, MeshError> {
         let n_nodes = self.nodes.len();
         if n_nodes < 4 || self.tets.is_empty() {
-            return Err(MeshError::Empty {
-                nodes: n_nodes,
-                tets: self.tets.len(),
-            });
+            return Err(MeshError::Empty { nodes: n_nodes, tets: self.tets.len() });
         }
         if self.region.len() != self.tets.len() {
             return Err(MeshError::Inconsistent {
@@ -132,39 +127,18 @@ impl TetMesh {
                 wanted: self.tets.len(),
             });
         }
-        if let Some(&r) = self
-            .region
-            .iter()
-            .find(|&&r| r as usize >= self.region_names.len())
-        {
+        if let Some(&r) = self.region.iter().find(|&&r| r as usize >= self.region_names.len()) {
             return Err(MeshError::Inconsistent {
                 what: format!("region index {r} against region names"),
                 found: self.region_names.len(),
                 wanted: r as usize + 1,
             });
         }
-        if let Some((node, x)) = self
-            .nodes
-            .iter()
-            .enumerate()
-            .find(|(_, x)| !x.iter().all(|c| c.is_finite()))
-        {
-            return Err(MeshError::NotFinite {
-                node,
-                x: x.x,
-                y: x.y,
-                z: x.z,
-            });
+        if let Some((node, x)) = self.nodes.iter().enumerate().find(|(_, x)| !x.iter().all(|c| c.is_finite())) {
+            return Err(MeshError::NotFinite { node, x: x.x, y: x.y, z: x.z });
         }
-        let in_range = |what: &dyn Fn() -> String, nodes: &[u32]| match nodes
-            .iter()
-            .find(|&&a| a as usize >= n_nodes)
-        {
-            Some(&node) => Err(MeshError::NodeOutOfRange {
-                what: what(),
-                node,
-                n_nodes,
-            }),
+        let in_range = |what: &dyn Fn() -> String, nodes: &[u32]| match nodes.iter().find(|&&a| a as usize >= n_nodes) {
+            Some(&node) => Err(MeshError::NodeOutOfRange { what: what(), node, n_nodes }),
             None => Ok(()),
         };
         for (e, tet) in self.tets.iter().enumerate() {
@@ -174,21 +148,14 @@ impl TetMesh {
             in_range(&|| format!("node set `{}`", set.name), &set.nodes)?;
         }
         for set in &self.face_sets {
-            in_range(
-                &|| format!("face set `{}`", set.name),
-                set.triangles.as_flattened(),
-            )?;
+            in_range(&|| format!("face set `{}`", set.name), set.triangles.as_flattened())?;
         }
         unique("node", self.node_sets.iter().map(|s| &s.name))?;
         unique("face", self.face_sets.iter().map(|s| &s.name))?;
         let inverted = |e: &usize| self.volume(*e) <= 0.0;
         if let Some(tet) = (0..self.tets.len()).find(inverted) {
             let count = (0..self.tets.len()).filter(inverted).count();
-            return Err(MeshError::Inverted {
-                tet,
-                volume: self.volume(tet),
-                count,
-            });
+            return Err(MeshError::Inverted { tet, volume: self.volume(tet), count });
         }
         Ok(self)
     }
@@ -233,26 +200,18 @@ impl TetMesh {
 
     /// Nodes of the skin triangles, ascending: the order of `skin.position`. Empty if the mesh has no skin.
     pub fn skin_nodes(&self) -> Vec<u32> {
-        let mut nodes = self
-            .face_set(SKIN)
-            .map_or(Vec::new(), |s| s.triangles.as_flattened().to_vec());
+        let mut nodes = self.face_set(SKIN).map_or(Vec::new(), |s| s.triangles.as_flattened().to_vec());
         nodes.sort_unstable();
         nodes.dedup();
         nodes
     }
 }
 
-fn unique<'a>(
-    kind: &'static str,
-    names: impl Iterator<Item = &'a String>,
-) -> Result<(), MeshError> {
+fn unique<'a>(kind: &'static str, names: impl Iterator<Item = &'a String>) -> Result<(), MeshError> {
     let mut seen = std::collections::BTreeSet::new();
     for name in names {
         if !seen.insert(name) {
-            return Err(MeshError::DuplicateName {
-                kind,
-                name: name.clone(),
-            });
+            return Err(MeshError::DuplicateName { kind, name: name.clone() });
         }
     }
     Ok(())

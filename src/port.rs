@@ -133,9 +133,6 @@ impl Port {
 
     /// Whether its value can change from one step to the next.
     pub fn is_continuous(&self) -> bool {
-        matches!(
-            self.causality,
-            Causality::Independent | Causality::Input | Causality::Output
-        )
+        matches!(self.causality, Causality::Independent | Causality::Input | Causality::Output)
     }
 }

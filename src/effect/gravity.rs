@@ -18,12 +18,7 @@ impl Term for Gravity {
     }
     fn energy(&self, at: &At, x: &[Vec3]) -> f64 {
         let acceleration = input3(at.inputs, self.input);
-        -self
-            .m
-            .iter()
-            .zip(x)
-            .map(|(m, x)| m * acceleration.dot(x))
-            .sum::<f64>()
+        -self.m.iter().zip(x).map(|(m, x)| m * acceleration.dot(x)).sum::<f64>()
     }
     fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
         let acceleration = input3(at.inputs, self.input);
@@ -33,14 +28,7 @@ impl Term for Gravity {
         self.energy(at, x)
     }
     fn couplings(&self, _clique: &mut dyn FnMut(&[u32])) {}
-    fn add_hessian(
-        &self,
-        _at: &At,
-        _x: &[Vec3],
-        _curvature: Curvature,
-        _sink: &mut dyn HessianSink,
-    ) {
-    }
+    fn add_hessian(&self, _at: &At, _x: &[Vec3], _curvature: Curvature, _sink: &mut dyn HessianSink) {}
     fn is_quadratic(&self) -> bool {
         true
     }

@@ -37,13 +37,7 @@ impl Term for Inertia {
         if at.dt == 0.0 {
             return 0.0;
         }
-        let sum: f64 = self
-            .m
-            .iter()
-            .zip(x)
-            .zip(at.x_tilde)
-            .map(|((m, x), y)| m * (x - y).norm_squared())
-            .sum();
+        let sum: f64 = self.m.iter().zip(x).zip(at.x_tilde).map(|((m, x), y)| m * (x - y).norm_squared()).sum();
         sum / (2.0 * at.dt * at.dt)
     }
     fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
@@ -61,11 +55,7 @@ impl Term for Inertia {
         }
     }
     fn add_hessian(&self, at: &At, _x: &[Vec3], _curvature: Curvature, sink: &mut dyn HessianSink) {
-        let scale = if at.dt == 0.0 {
-            0.0
-        } else {
-            1.0 / (at.dt * at.dt)
-        };
+        let scale = if at.dt == 0.0 { 0.0 } else { 1.0 / (at.dt * at.dt) };
         for (a, m) in self.m.iter().enumerate() {
             sink.add(&[a as u32], &[scale * m * Mat3::identity()]);
         }

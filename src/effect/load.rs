@@ -18,11 +18,7 @@ impl Term for DeadLoad {
     }
     fn energy(&self, at: &At, x: &[Vec3]) -> f64 {
         let f = input3(at.inputs, self.input);
-        -self
-            .shares
-            .iter()
-            .map(|&(a, w)| w * f.dot(&x[a as usize]))
-            .sum::<f64>()
+        -self.shares.iter().map(|&(a, w)| w * f.dot(&x[a as usize])).sum::<f64>()
     }
     fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
         let f = input3(at.inputs, self.input);
@@ -32,14 +28,7 @@ impl Term for DeadLoad {
         self.energy(at, x)
     }
     fn couplings(&self, _clique: &mut dyn FnMut(&[u32])) {}
-    fn add_hessian(
-        &self,
-        _at: &At,
-        _x: &[Vec3],
-        _curvature: Curvature,
-        _sink: &mut dyn HessianSink,
-    ) {
-    }
+    fn add_hessian(&self, _at: &At, _x: &[Vec3], _curvature: Curvature, _sink: &mut dyn HessianSink) {}
     fn is_quadratic(&self) -> bool {
         true
     }

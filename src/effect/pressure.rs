@@ -34,29 +34,15 @@ impl Term for Pressure {
     }
     fn energy(&self, at: &At, x: &[Vec3]) -> f64 {
         let mut sum = 0.0;
-        self.each(at, |triangle, third| {
-            sum += triangle
-                .iter()
-                .map(|&a| third.dot(&x[a as usize]))
-                .sum::<f64>()
-        });
+        self.each(at, |triangle, third| sum += triangle.iter().map(|&a| third.dot(&x[a as usize])).sum::<f64>());
         sum
     }
     fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
-        self.each(at, |triangle, third| {
-            triangle.iter().for_each(|&a| g[a as usize] += third)
-        });
+        self.each(at, |triangle, third| triangle.iter().for_each(|&a| g[a as usize] += third));
         self.energy(at, x)
     }
     fn couplings(&self, _clique: &mut dyn FnMut(&[u32])) {}
-    fn add_hessian(
-        &self,
-        _at: &At,
-        _x: &[Vec3],
-        _curvature: Curvature,
-        _sink: &mut dyn HessianSink,
-    ) {
-    }
+    fn add_hessian(&self, _at: &At, _x: &[Vec3], _curvature: Curvature, _sink: &mut dyn HessianSink) {}
     fn is_lagged(&self) -> bool {
         true
     }

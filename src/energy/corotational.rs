@@ -40,13 +40,8 @@ impl Energy for Corotational {
         let weight = self.0.lambda * (f.s.sum() - 3.0) - 2.0 * self.0.mu;
         for i in 0..3 {
             let sum = f.s.sum() - f.s[i];
-            let sum = if sum.abs() < LEAST_STRETCH_SUM {
-                LEAST_STRETCH_SUM
-            } else {
-                sum
-            };
-            let twist: Vec9 = vec9(&(f.U * skew(&Vec3::ith(i, 1.0)) * f.V.transpose()))
-                / std::f64::consts::SQRT_2;
+            let sum = if sum.abs() < LEAST_STRETCH_SUM { LEAST_STRETCH_SUM } else { sum };
+            let twist: Vec9 = vec9(&(f.U * skew(&Vec3::ith(i, 1.0)) * f.V.transpose())) / std::f64::consts::SQRT_2;
             H += (weight * 2.0 / sum) * twist * twist.transpose();
         }
         H

@@ -40,9 +40,6 @@ pub struct Lame {
 impl Lame {
     /// From Young's modulus `E` (Pa) and Poisson's ratio `nu`: the only such conversion in the crate.
     pub fn new(E: f64, nu: f64) -> Lame {
-        Lame {
-            mu: E / (2.0 * (1.0 + nu)),
-            lambda: E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
-        }
+        Lame { mu: E / (2.0 * (1.0 + nu)), lambda: E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) }
     }
 }

@@ -1,9 +1,6 @@
 //! From the Hessian cliques of terms to the matrices of the unknowns.
 
-use super::{
-    At, BlockMatrix, Configuration, CouplingMatrix, Curvature, Dofs, HessianSink, Pattern, Role,
-    Term,
-};
+use super::{At, BlockMatrix, Configuration, CouplingMatrix, Curvature, Dofs, HessianSink, Pattern, Role, Term};
 use crate::math::{Mat3, Vec3};
 
 /// Where one block of a clique goes; found once, then read off in the same order at every assembly.
@@ -56,16 +53,10 @@ impl Assembly {
         let found = |k: Option<usize>| k.expect("pattern holds every coupling") as u32;
         each_pair(terms, |a, b| {
             places.push(match (dofs.role[a as usize], dofs.role[b as usize]) {
-                (Role::Free(i), Role::Free(j)) if i >= j => {
-                    Place::Unknown(found(K.pattern.find(i, j)))
-                }
-                (Role::Free(i), Role::Free(j)) => {
-                    Place::UnknownTransposed(found(K.pattern.find(j, i)))
-                }
+                (Role::Free(i), Role::Free(j)) if i >= j => Place::Unknown(found(K.pattern.find(i, j))),
+                (Role::Free(i), Role::Free(j)) => Place::UnknownTransposed(found(K.pattern.find(j, i))),
                 (Role::Free(i), Role::Prescribed(p)) => Place::Coupling(found(K_p.find(i, p))),
-                (Role::Prescribed(p), Role::Free(j)) => {
-                    Place::CouplingTransposed(found(K_p.find(j, p)))
-                }
+                (Role::Prescribed(p), Role::Free(j)) => Place::CouplingTransposed(found(K_p.find(j, p))),
                 (Role::Prescribed(_), Role::Prescribed(_)) => Place::Nowhere,
                 _ => Place::Rigid,
             });
@@ -87,13 +78,7 @@ impl Assembly {
     ) {
         self.K.blocks.fill(Mat3::zeros());
         self.K_p.blocks.fill(Mat3::zeros());
-        let mut scatter = Scatter {
-            assembly: self,
-            cursor: 0,
-            dofs,
-            config,
-            pivots,
-        };
+        let mut scatter = Scatter { assembly: self, cursor: 0, dofs, config, pivots };
         for term in terms {
             term.add_hessian(at, &config.x, curvature, &mut scatter);
         }
@@ -145,13 +130,9 @@ impl HessianSink for Scatter<'_> {
                 self.cursor += 1;
                 match place {
                     Place::Unknown(k) => self.assembly.K.blocks[k as usize] += H,
-                    Place::UnknownTransposed(k) => {
-                        self.assembly.K.blocks[k as usize] += H.transpose()
-                    }
+                    Place::UnknownTransposed(k) => self.assembly.K.blocks[k as usize] += H.transpose(),
                     Place::Coupling(k) => self.assembly.K_p.blocks[k as usize] += H,
-                    Place::CouplingTransposed(k) => {
-                        self.assembly.K_p.blocks[k as usize] += H.transpose()
-                    }
+                    Place::CouplingTransposed(k) => self.assembly.K_p.blocks[k as usize] += H.transpose(),
                     Place::Nowhere => {}
                     Place::Rigid => self.add_rigid(a, b, H),
                 }

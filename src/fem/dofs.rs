@@ -76,18 +76,9 @@ impl Dofs {
         let bodies = rigid
             .into_iter()
             .enumerate()
-            .map(|(b, (bone, nodes))| RigidBody {
-                bone,
-                nodes,
-                block: (free.len() + 2 * b) as u32,
-            })
+            .map(|(b, (bone, nodes))| RigidBody { bone, nodes, block: (free.len() + 2 * b) as u32 })
             .collect();
-        Dofs {
-            role,
-            free,
-            prescribed,
-            bodies,
-        }
+        Dofs { role, free, prescribed, bodies }
     }
 
     /// Number of 3-vectors of unknowns.
@@ -98,24 +89,14 @@ impl Dofs {
     /// Blocks that move node `a`, with dx_a / d(block); none for a prescribed node.
     ///
     /// `arm` is the node's place relative to its body's pivot.
-    pub fn movers(
-        &self,
-        a: u32,
-        arm: impl FnOnce(&RigidBody) -> Vec3,
-    ) -> ([(u32, Mat3); 2], usize) {
+    pub fn movers(&self, a: u32, arm: impl FnOnce(&RigidBody) -> Vec3) -> ([(u32, Mat3); 2], usize) {
         let nothing = (u32::MAX, Mat3::zeros());
         match self.role[a as usize] {
             Role::Free(block) => ([(block, Mat3::identity()), nothing], 1),
             Role::Prescribed(_) => ([nothing, nothing], 0),
             Role::Rigid(b) => {
                 let body = &self.bodies[b as usize];
-                (
-                    [
-                        (body.block, Mat3::identity()),
-                        (body.block + 1, -skew(&arm(body))),
-                    ],
-                    2,
-                )
+                ([(body.block, Mat3::identity()), (body.block + 1, -skew(&arm(body)))], 2)
             }
         }
     }
@@ -156,10 +137,7 @@ impl Dofs {
         for body in &self.bodies {
             let old = &from.poses[body.bone];
             let (dt, dw) = (d[body.block as usize], d[body.block as usize + 1]);
-            let pose = Pose {
-                t: old.t + alpha * dt,
-                R: exp_rotation(&(alpha * dw)) * old.R,
-            };
+            let pose = Pose { t: old.t + alpha * dt, R: exp_rotation(&(alpha * dw)) * old.R };
             to.poses[body.bone] = pose;
             for &a in &body.nodes {
                 to.x[a as usize] = pose.place(&pivots[body.bone], &X[a as usize]);
@@ -169,18 +147,11 @@ impl Dofs {
 
     /// Largest displacement (m) that the increment `d` gives to any node.
     pub fn largest_motion(&self, d: &[Vec3], config: &Configuration, pivots: &[Vec3]) -> f64 {
-        let free = d[..self.free.len()]
-            .iter()
-            .map(|d| d.norm_squared())
-            .fold(0.0, f64::max)
-            .sqrt();
+        let free = d[..self.free.len()].iter().map(|d| d.norm_squared()).fold(0.0, f64::max).sqrt();
         let rigid = self.bodies.iter().map(|body| {
             let p = pivots[body.bone] + config.poses[body.bone].t;
             let (dt, dw) = (d[body.block as usize], d[body.block as usize + 1]);
-            body.nodes
-                .iter()
-                .map(|&a| (dt + dw.cross(&(config.x[a as usize] - p))).norm())
-                .fold(0.0, f64::max)
+            body.nodes.iter().map(|&a| (dt + dw.cross(&(config.x[a as usize] - p))).norm()).fold(0.0, f64::max)
         });
         rigid.fold(free, f64::max)
     }

@@ -14,9 +14,7 @@ pub struct Pattern {
 impl Pattern {
     /// Pattern of `n` blocks with every diagonal block and the given couplings `(row, column)`, either way round.
     pub fn new(n: usize, couplings: impl Iterator<Item = (u32, u32)>) -> Pattern {
-        let mut keys: Vec<u64> = couplings
-            .map(|(i, j)| (u64::from(i.min(j)) << 32) | u64::from(i.max(j)))
-            .collect();
+        let mut keys: Vec<u64> = couplings.map(|(i, j)| (u64::from(i.min(j)) << 32) | u64::from(i.max(j))).collect();
         keys.extend((0..n as u64).map(|j| (j << 32) | j));
         keys.sort_unstable();
         keys.dedup();
@@ -27,10 +25,7 @@ impl Pattern {
         for j in 0..n {
             start[j + 1] += start[j];
         }
-        Pattern {
-            start,
-            row: keys.into_iter().map(|key| key as u32).collect(),
-        }
+        Pattern { start, row: keys.into_iter().map(|key| key as u32).collect() }
     }
 
     /// Number of block columns.
@@ -40,10 +35,7 @@ impl Pattern {
 
     /// Index of the stored block at row `i` >= column `j`.
     pub fn find(&self, i: u32, j: u32) -> Option<usize> {
-        let (from, to) = (
-            self.start[j as usize] as usize,
-            self.start[j as usize + 1] as usize,
-        );
+        let (from, to) = (self.start[j as usize] as usize, self.start[j as usize + 1] as usize);
         self.row[from..to].binary_search(&i).ok().map(|k| from + k)
     }
 }
@@ -69,10 +61,7 @@ impl BlockMatrix {
     /// # Panics
     /// If the pattern does not hold it.
     pub fn at_mut(&mut self, i: u32, j: u32) -> &mut Mat3 {
-        let k = self
-            .pattern
-            .find(i, j)
-            .expect("pattern holds every coupling");
+        let k = self.pattern.find(i, j).expect("pattern holds every coupling");
         &mut self.blocks[k]
     }
 
@@ -116,23 +105,13 @@ impl CouplingMatrix {
             start[i + 1] += start[i];
         }
         let blocks = vec![Mat3::zeros(); keys.len()];
-        CouplingMatrix {
-            start,
-            column: keys.into_iter().map(|(_, p)| p).collect(),
-            blocks,
-        }
+        CouplingMatrix { start, column: keys.into_iter().map(|(_, p)| p).collect(), blocks }
     }
 
     /// Index of the stored block at `(i, p)`.
     pub fn find(&self, i: u32, p: u32) -> Option<usize> {
-        let (from, to) = (
-            self.start[i as usize] as usize,
-            self.start[i as usize + 1] as usize,
-        );
-        self.column[from..to]
-            .binary_search(&p)
-            .ok()
-            .map(|k| from + k)
+        let (from, to) = (self.start[i as usize] as usize, self.start[i as usize + 1] as usize);
+        self.column[from..to].binary_search(&p).ok().map(|k| from + k)
     }
 
     /// The stored block at `(i, p)`.

@@ -39,11 +39,7 @@ pub struct Strain {
 
 impl Strain {
     /// The strain of no element at all.
-    pub const NONE: Strain = Strain {
-        min_det_f: f64::INFINITY,
-        max_stretch: 0.0,
-        energy: 0.0,
-    };
+    pub const NONE: Strain = Strain { min_det_f: f64::INFINITY, max_stretch: 0.0, energy: 0.0 };
 
     /// The strain of both.
     pub fn and(self, other: Strain) -> Strain {
@@ -137,9 +133,7 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
     }
 
     fn energy(&self, _at: &At, x: &[Vec3]) -> f64 {
-        (0..self.0.len())
-            .map(|e| self.0.energy(e, &self.gather(e, x).1))
-            .sum()
+        (0..self.0.len()).map(|e| self.0.energy(e, &self.gather(e, x).1)).sum()
     }
 
     fn add_gradient(&self, _at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
@@ -176,8 +170,6 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
     }
 
     fn strain(&self, x: &[Vec3]) -> Strain {
-        (0..self.0.len()).fold(Strain::NONE, |s, e| {
-            s.and(self.0.strain(e, &self.gather(e, x).1))
-        })
+        (0..self.0.len()).fold(Strain::NONE, |s, e| s.and(self.0.strain(e, &self.gather(e, x).1)))
     }
 }

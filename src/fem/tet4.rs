@@ -41,19 +41,13 @@ impl<M: Energy> Tet4<M> {
                 Element { nodes, dN, V }
             })
             .collect();
-        Tet4 {
-            material,
-            elements,
-            quadratic: M::NAME == crate::energy::Linear::NAME,
-        }
+        Tet4 { material, elements, quadratic: M::NAME == crate::energy::Linear::NAME }
     }
 }
 
 /// F, summed from edge vectors so that a translation changes nothing.
 fn deformation(dN: &[Vec3; 4], x: &[Vec3; 4]) -> Mat3 {
-    (x[1] - x[0]) * dN[1].transpose()
-        + (x[2] - x[0]) * dN[2].transpose()
-        + (x[3] - x[0]) * dN[3].transpose()
+    (x[1] - x[0]) * dN[1].transpose() + (x[2] - x[0]) * dN[2].transpose() + (x[3] - x[0]) * dN[3].transpose()
 }
 
 impl<M: Energy> Kernel<4> for Tet4<M> {
@@ -96,31 +90,14 @@ impl<M: Energy> Kernel<4> for Tet4<M> {
             let [h0, h1, h2] = &half[b - 1];
             h0 * dN[a][0] + h1 * dN[a][1] + h2 * dN[a][2]
         };
-        let (k11, k12, k13, k22, k23, k33) = (
-            block(1, 1),
-            block(1, 2),
-            block(1, 3),
-            block(2, 2),
-            block(2, 3),
-            block(3, 3),
-        );
+        let (k11, k12, k13, k22, k23, k33) =
+            (block(1, 1), block(1, 2), block(1, 3), block(2, 2), block(2, 3), block(3, 3));
         // Rows sum to zero, since a translation changes nothing.
         let k01 = -(k11 + k12.transpose() + k13.transpose());
         let k02 = -(k12 + k22 + k23.transpose());
         let k03 = -(k13 + k23 + k33);
         let k00 = -(k01 + k02 + k03);
-        upper.copy_from_slice(&[
-            0.5 * (k00 + k00.transpose()),
-            k01,
-            k02,
-            k03,
-            k11,
-            k12,
-            k13,
-            k22,
-            k23,
-            k33,
-        ]);
+        upper.copy_from_slice(&[0.5 * (k00 + k00.transpose()), k01, k02, k03, k11, k12, k13, k22, k23, k33]);
     }
     fn strain(&self, e: usize, x: &[Vec3; 4]) -> Strain {
         let Element { dN, V, .. } = &self.elements[e];

@@ -20,12 +20,7 @@ pub fn exp_rotation(w: &Vec3) -> Mat3 {
 
 /// Rotation vector of a rotation matrix, of length at most pi.
 pub fn log_rotation(R: &Mat3) -> Vec3 {
-    let axial = 0.5
-        * Vec3::new(
-            R[(2, 1)] - R[(1, 2)],
-            R[(0, 2)] - R[(2, 0)],
-            R[(1, 0)] - R[(0, 1)],
-        );
+    let axial = 0.5 * Vec3::new(R[(2, 1)] - R[(1, 2)], R[(0, 2)] - R[(2, 0)], R[(1, 0)] - R[(0, 1)]);
     let (sin, cos) = (axial.norm(), 0.5 * (R.trace() - 1.0));
     let angle = sin.atan2(cos);
     if sin > 1e-6 {
@@ -36,9 +31,7 @@ pub fn log_rotation(R: &Mat3) -> Vec3 {
     }
     // Half a turn: R + I = 2 a a^T, so the longest column is the axis.
     let S = R + Mat3::identity();
-    let longest = (0..3)
-        .max_by(|&i, &j| S[(i, i)].total_cmp(&S[(j, j)]))
-        .expect("three columns");
+    let longest = (0..3).max_by(|&i, &j| S[(i, i)].total_cmp(&S[(j, j)])).expect("three columns");
     let axis = Vec3::from(S.column(longest)).normalize();
     let axis = if axis.dot(&axial) < 0.0 { -axis } else { axis };
     axis * angle
@@ -55,17 +48,12 @@ pub struct Pose {
 
 impl Pose {
     /// The rest pose.
-    pub const REST: Pose = Pose {
-        t: Vec3::new(0.0, 0.0, 0.0),
-        R: Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-    };
+    pub const REST: Pose =
+        Pose { t: Vec3::new(0.0, 0.0, 0.0), R: Mat3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) };
 
     /// The pose of a translation (m) and a rotation vector (rad).
     pub fn new(t: Vec3, w: &Vec3) -> Pose {
-        Pose {
-            t,
-            R: exp_rotation(w),
-        }
+        Pose { t, R: exp_rotation(w) }
     }
 
     /// Current place of the rest point `X`; bit-exact `X` in the rest pose.
@@ -86,21 +74,10 @@ pub fn best_fit(
     let n = from.clone().count().max(1) as f64;
     let a = from.clone().sum::<Vec3>() / n;
     let c = to.clone().sum::<Vec3>() / n;
-    let H: Mat3 = from
-        .zip(to)
-        .map(|(x, y)| (y - c) * (x - a).transpose())
-        .sum();
+    let H: Mat3 = from.zip(to).map(|(x, y)| (y - c) * (x - a).transpose()).sum();
     let f = svd(&H);
     let determined = f.s[1] > 1e-12 * f.s[0].max(f64::MIN_POSITIVE);
-    (
-        if determined {
-            f.U * f.V.transpose()
-        } else {
-            Mat3::identity()
-        },
-        a,
-        c,
-    )
+    (if determined { f.U * f.V.transpose() } else { Mat3::identity() }, a, c)
 }
 
 #[cfg(test)]

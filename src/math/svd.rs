@@ -52,11 +52,7 @@ pub fn svd(F: &Mat3) -> Svd {
     let v2 = v[0].cross(&v[1]);
     Svd {
         U: Mat3::from_columns(&[u0, u1, u2]),
-        s: Vec3::new(
-            u0.dot(&B[order[0]]),
-            u1.dot(&B[order[1]]),
-            u2.dot(&(F * v2)),
-        ),
+        s: Vec3::new(u0.dot(&B[order[0]]), u1.dot(&B[order[1]]), u2.dot(&(F * v2))),
         V: Mat3::from_columns(&[v[0], v[1], v2]),
     }
 }
@@ -64,19 +60,12 @@ pub fn svd(F: &Mat3) -> Svd {
 /// F = R S with R a rotation (det R = 1) and S symmetric; S is indefinite where det F < 0.
 pub fn polar(F: &Mat3) -> (Mat3, Mat3) {
     let Svd { U, s, V } = svd(F);
-    (
-        U * V.transpose(),
-        V * Mat3::from_diagonal(&s) * V.transpose(),
-    )
+    (U * V.transpose(), V * Mat3::from_diagonal(&s) * V.transpose())
 }
 
 fn unit_or(a: Vec3, otherwise: Vec3) -> Vec3 {
     let n = a.norm();
-    if n > f64::MIN_POSITIVE {
-        a / n
-    } else {
-        otherwise
-    }
+    if n > f64::MIN_POSITIVE { a / n } else { otherwise }
 }
 
 fn any_normal(a: &Vec3) -> Vec3 {
@@ -107,14 +96,9 @@ mod tests {
             Mat3::from_diagonal(&Vec3::new(1.0, 0.0, -1e-8)),
         ] {
             let Svd { U, s, V } = svd(&F);
-            assert!(
-                (U * Mat3::from_diagonal(&s) * V.transpose() - F).norm()
-                    <= 1e-14 * (F.norm() + 1e-9)
-            );
+            assert!((U * Mat3::from_diagonal(&s) * V.transpose() - F).norm() <= 1e-14 * (F.norm() + 1e-9));
             for Q in [U, V] {
-                assert!(
-                    (Q.transpose() * Q - Mat3::identity()).norm() < 1e-14 && Q.determinant() > 0.0
-                );
+                assert!((Q.transpose() * Q - Mat3::identity()).norm() < 1e-14 && Q.determinant() > 0.0);
             }
             assert!(s[0] >= s[1] && s[1] >= s[2].abs() - 1e-15);
         }

@@ -24,8 +24,7 @@ pub fn cofactor(F: &Mat3) -> Mat3 {
 pub fn d2JdF2(F: &Mat3) -> Mat9 {
     let s = [0, 1, 2].map(|j| skew(&Vec3::from(F.column(j))));
     let mut H = Mat9::zeros();
-    let mut put =
-        |a: usize, b: usize, M: &Mat3| H.fixed_view_mut::<3, 3>(3 * a, 3 * b).copy_from(M);
+    let mut put = |a: usize, b: usize, M: &Mat3| H.fixed_view_mut::<3, 3>(3 * a, 3 * b).copy_from(M);
     put(0, 1, &-s[2]);
     put(0, 2, &s[1]);
     put(1, 0, &s[2]);

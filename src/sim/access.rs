@@ -11,20 +11,9 @@ impl Sim {
     /// [`SimError::Port`] if the port cannot be set, [`SimError::Range`] if the values do not fit. Values that are not
     /// finite are refused by the next step.
     pub fn set_f64(&mut self, port: usize, offset: usize, values: &[f64]) -> Result<(), SimError> {
-        let p = self.port(
-            port,
-            Type::Float64,
-            "a settable Float64 port",
-            Port::is_settable,
-        )?;
+        let p = self.port(port, Type::Float64, "a settable Float64 port", Port::is_settable)?;
         check_range(p, offset, values.len())?;
-        let first = self
-            .model
-            .parts()
-            .layout
-            .first(p.slot)
-            .expect("every settable port lies in the layout")
-            + offset;
+        let first = self.model.parts().layout.first(p.slot).expect("every settable port lies in the layout") + offset;
         self.state.inputs[first..first + values.len()].copy_from_slice(values);
         Ok(())
     }
@@ -48,22 +37,14 @@ impl Sim {
             Slot::BoneReactionForce => rows(|k| o.reaction_force[k], offset, out),
             Slot::BoneReactionTorque => rows(|k| o.reaction_torque[k], offset, out),
             Slot::BonePoseTranslation => rows(|k| self.state.config.poses[k].t, offset, out),
-            Slot::BonePoseRotation => {
-                rows(|k| log_rotation(&self.state.config.poses[k].R), offset, out)
-            }
+            Slot::BonePoseRotation => rows(|k| log_rotation(&self.state.config.poses[k].R), offset, out),
             Slot::SolverResidual => out.fill(o.residual),
             Slot::EnergyElastic => out.fill(o.elastic),
             Slot::EnergyKinetic => out.fill(o.kinetic),
             Slot::MinDetF => out.fill(o.min_det_f),
             Slot::MaxStretch => out.fill(o.max_stretch),
             input => {
-                let first = self
-                    .model
-                    .parts()
-                    .layout
-                    .first(input)
-                    .expect("every other port is an input")
-                    + offset;
+                let first = self.model.parts().layout.first(input).expect("every other port is an input") + offset;
                 out.copy_from_slice(&self.state.inputs[first..first + out.len()]);
             }
         }
@@ -78,9 +59,7 @@ impl Sim {
         let p = self.port(port, Type::Int32, "an Int32 port", |_| true)?;
         check_range(p, offset, out.len())?;
         match p.slot {
-            Slot::SkinTriangles => {
-                out.copy_from_slice(&self.model.skin_triangles()[offset..offset + out.len()])
-            }
+            Slot::SkinTriangles => out.copy_from_slice(&self.model.skin_triangles()[offset..offset + out.len()]),
             _ => out.fill(self.state.outputs.iterations as i32),
         }
         Ok(())
@@ -97,47 +76,20 @@ impl Sim {
         Ok(())
     }
 
-    fn port(
-        &self,
-        k: usize,
-        ty: Type,
-        wanted: &'static str,
-        also: impl Fn(&Port) -> bool,
-    ) -> Result<&Port, SimError> {
+    fn port(&self, k: usize, ty: Type, wanted: &'static str, also: impl Fn(&Port) -> bool) -> Result<&Port, SimError> {
         let ports = self.model.ports();
-        ports
-            .get(k)
-            .filter(|p| p.ty == ty && also(p))
-            .ok_or(SimError::Port {
-                port: k,
-                n_ports: ports.len(),
-                wanted,
-            })
+        ports.get(k).filter(|p| p.ty == ty && also(p)).ok_or(SimError::Port { port: k, n_ports: ports.len(), wanted })
     }
 
     fn marker(&self, k: usize) -> Vec3 {
         let marker = &self.model.parts().markers[k];
-        marker
-            .nodes
-            .iter()
-            .zip(marker.weights)
-            .map(|(&a, w)| w * self.state.config.x[a as usize])
-            .sum()
+        marker.nodes.iter().zip(marker.weights).map(|(&a, w)| w * self.state.config.x[a as usize]).sum()
     }
 }
 
 fn check_range(port: &Port, offset: usize, n: usize) -> Result<(), SimError> {
     let (len, end) = (port.len(), offset.saturating_add(n));
-    if end <= len {
-        Ok(())
-    } else {
-        Err(SimError::Range {
-            name: port.name.clone(),
-            len,
-            offset,
-            end,
-        })
-    }
+    if end <= len { Ok(()) } else { Err(SimError::Range { name: port.name.clone(), len, offset, end }) }
 }
 
 /// Rows of three, flattened, from element `offset` on.

@@ -21,9 +21,7 @@ use crate::solve::SolveError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimError {
     /// The solver gave up, also with the host step cut into small pieces.
-    #[error(
-        "step from t = {t} s by {dt} s: {source} (the load was cut down to 1/{cuts} of the step)"
-    )]
+    #[error("step from t = {t} s by {dt} s: {source} (the load was cut down to 1/{cuts} of the step)")]
     Solve {
         /// Start of the step, s.
         t: f64,
@@ -161,10 +159,7 @@ impl Sim {
     /// [`SimError::ForeignState`].
     pub fn restore(&mut self, state: &State) -> Result<(), SimError> {
         if !state.fits(&self.model) {
-            return Err(SimError::ForeignState {
-                found: state.config.x.len(),
-                wanted: self.model.mesh().nodes.len(),
-            });
+            return Err(SimError::ForeignState { found: state.config.x.len(), wanted: self.model.mesh().nodes.len() });
         }
         self.state.clone_from(state);
         Ok(())

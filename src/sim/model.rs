@@ -133,31 +133,19 @@ impl Model {
     /// # Errors
     /// [`Unconstrained`] for a quasi-static scene with loose tissue.
     pub fn new(mut parts: ModelParts) -> Result<Model, Unconstrained> {
-        let mut prescribed: Vec<u32> = parts
-            .bones
-            .iter()
-            .filter(|b| b.drive != Drive::Force)
-            .flat_map(|b| b.nodes.iter().copied())
-            .collect();
+        let mut prescribed: Vec<u32> =
+            parts.bones.iter().filter(|b| b.drive != Drive::Force).flat_map(|b| b.nodes.iter().copied()).collect();
         prescribed.sort_unstable();
-        let rigid = parts
-            .bones
-            .iter()
-            .enumerate()
-            .filter(|(_, b)| b.drive == Drive::Force);
+        let rigid = parts.bones.iter().enumerate().filter(|(_, b)| b.drive == Drive::Force);
         let rigid = rigid.map(|(k, b)| (k, b.nodes.clone())).collect();
         let dofs = Dofs::new(parts.mesh.nodes.len(), prescribed, rigid);
         if parts.inertia.is_none() {
             check_held(&parts, &dofs)?;
         }
         let skin = parts.mesh.skin_nodes();
-        let row = |a: &u32| {
-            skin.binary_search(a)
-                .expect("skin nodes come from the triangles") as i32
-        };
-        let triangles: Vec<i32> = parts.mesh.face_set(SKIN).map_or(Vec::new(), |s| {
-            s.triangles.as_flattened().iter().map(row).collect()
-        });
+        let row = |a: &u32| skin.binary_search(a).expect("skin nodes come from the triangles") as i32;
+        let triangles: Vec<i32> =
+            parts.mesh.face_set(SKIN).map_or(Vec::new(), |s| s.triangles.as_flattened().iter().map(row).collect());
         let ports = table(&parts, skin.len(), triangles.len() / 3);
         let osteotomy = osteotomy_edges(&parts.mesh, &parts.bones);
         if !osteotomy.is_empty() {
@@ -168,15 +156,7 @@ impl Model {
             ));
         }
         let token = token(&parts, &ports);
-        Ok(Model {
-            parts,
-            ports,
-            dofs,
-            skin,
-            triangles,
-            osteotomy,
-            token,
-        })
+        Ok(Model { parts, ports, dofs, skin, triangles, osteotomy, token })
     }
 
     /// Name of the scene.
@@ -225,17 +205,12 @@ impl Model {
 pub fn osteotomy_edges(mesh: &TetMesh, bones: &[Bone]) -> Vec<(u32, u32)> {
     let mut owner = vec![u32::MAX; mesh.nodes.len()];
     for (b, bone) in bones.iter().enumerate() {
-        bone.nodes
-            .iter()
-            .for_each(|&a| owner[a as usize] = b as u32);
+        bone.nodes.iter().for_each(|&a| owner[a as usize] = b as u32);
     }
     let mut edges: Vec<(u32, u32)> = mesh
         .tets
         .iter()
-        .flat_map(|t| {
-            [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
-                .map(|(i, j)| (t[i].min(t[j]), t[i].max(t[j])))
-        })
+        .flat_map(|t| [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)].map(|(i, j)| (t[i].min(t[j]), t[i].max(t[j]))))
         .filter(|&(a, b)| {
             let (p, q) = (owner[a as usize], owner[b as usize]);
             p != q && p != u32::MAX && q != u32::MAX
@@ -254,9 +229,7 @@ fn check_held(parts: &ModelParts, dofs: &Dofs) -> Result<(), Unconstrained> {
         tet.iter().for_each(|&a| piece.join(tet[0], a));
     }
     for body in &dofs.bodies {
-        body.nodes
-            .iter()
-            .for_each(|&a| piece.join(body.nodes[0], a));
+        body.nodes.iter().for_each(|&a| piece.join(body.nodes[0], a));
     }
     let roots: Vec<u32> = (0..n as u32).map(|a| piece.root(a)).collect();
     let mut held: std::collections::BTreeMap<u32, Vec<Vec3>> = Default::default();
@@ -267,27 +240,15 @@ fn check_held(parts: &ModelParts, dofs: &Dofs) -> Result<(), Unconstrained> {
         entry.1 += parts.mesh.nodes[a];
     }
     for &a in &dofs.prescribed {
-        held.entry(roots[a as usize])
-            .or_default()
-            .push(parts.mesh.nodes[a as usize]);
+        held.entry(roots[a as usize]).or_default().push(parts.mesh.nodes[a as usize]);
     }
-    let loose: Vec<_> = size
-        .iter()
-        .filter(|(root, _)| !spans_a_plane(held.get(root)))
-        .collect();
+    let loose: Vec<_> = size.iter().filter(|(root, _)| !spans_a_plane(held.get(root))).collect();
     let Some((root, (nodes, sum))) = loose.iter().max_by_key(|(_, (nodes, _))| *nodes) else {
         return Ok(());
     };
     let c = sum / *nodes as f64;
     let held = held.get(root).map_or(0, Vec::len);
-    Err(Unconstrained {
-        count: loose.len(),
-        nodes: *nodes,
-        held,
-        x: c.x,
-        y: c.y,
-        z: c.z,
-    })
+    Err(Unconstrained { count: loose.len(), nodes: *nodes, held, x: c.x, y: c.y, z: c.z })
 }
 
 fn spans_a_plane(points: Option<&Vec<Vec3>>) -> bool {
@@ -328,26 +289,12 @@ fn token(parts: &ModelParts, ports: &[Port]) -> String {
         ));
     }
     let mesh = &parts.mesh;
-    mesh.nodes
-        .iter()
-        .flat_map(|x| x.iter())
-        .for_each(|c| hash.update(c.to_le_bytes()));
-    mesh.tets
-        .as_flattened()
-        .iter()
-        .chain(&mesh.region)
-        .for_each(|i| hash.update(i.to_le_bytes()));
+    mesh.nodes.iter().flat_map(|x| x.iter()).for_each(|c| hash.update(c.to_le_bytes()));
+    mesh.tets.as_flattened().iter().chain(&mesh.region).for_each(|i| hash.update(i.to_le_bytes()));
     for bone in &parts.bones {
         bone.nodes.iter().for_each(|a| hash.update(a.to_le_bytes()));
     }
     let digest = hash.finalize();
     let hex: String = digest.iter().take(16).map(|b| format!("{b:02x}")).collect();
-    format!(
-        "{{{}-{}-{}-{}-{}}}",
-        &hex[..8],
-        &hex[8..12],
-        &hex[12..16],
-        &hex[16..20],
-        &hex[20..]
-    )
+    format!("{{{}-{}-{}-{}-{}}}", &hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..])
 }

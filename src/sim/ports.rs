@@ -12,18 +12,10 @@ pub struct Layout {
 
 impl Layout {
     /// Lays out the inputs of a scene with these bones `(drive, nodes)`, forces and pressures.
-    pub fn new(
-        bones: &[(Drive, usize)],
-        n_loads: usize,
-        n_pressures: usize,
-        gravity: bool,
-    ) -> Layout {
+    pub fn new(bones: &[(Drive, usize)], n_loads: usize, n_pressures: usize, gravity: bool) -> Layout {
         let n = 3 * bones.len();
         let any = |drive: Drive| bones.iter().any(|(d, _)| *d == drive);
-        let mut layout = Layout {
-            spans: Vec::new(),
-            len: 0,
-        };
+        let mut layout = Layout { spans: Vec::new(), len: 0 };
         let mut add = |slot: Slot, len: usize, exists: bool| {
             if exists && len > 0 {
                 layout.spans.push((slot, layout.len, len));
@@ -39,21 +31,14 @@ impl Layout {
         add(Slot::Gravity, 3, gravity);
         add(Slot::BonePivot, n, true);
         for (b, (drive, nodes)) in bones.iter().enumerate() {
-            add(
-                Slot::BoneNodal(b as u32),
-                3 * nodes,
-                *drive == Drive::Displacement,
-            );
+            add(Slot::BoneNodal(b as u32), 3 * nodes, *drive == Drive::Displacement);
         }
         layout
     }
 
     /// First input of a slot, if the scene has it.
     pub fn first(&self, slot: Slot) -> Option<usize> {
-        self.spans
-            .iter()
-            .find(|(s, ..)| *s == slot)
-            .map(|(_, first, _)| *first)
+        self.spans.iter().find(|(s, ..)| *s == slot).map(|(_, first, _)| *first)
     }
 
     /// Number of inputs.
@@ -115,14 +100,7 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
     let dynamic = parts.inertia.is_some();
     let any_force = parts.bones.iter().any(|b| b.drive == Drive::Force);
     let mut ports = Vec::new();
-    let mut add = |slot,
-                   name: &str,
-                   ty,
-                   shape: &[usize],
-                   unit,
-                   causality,
-                   rows: &[String],
-                   description: &str| {
+    let mut add = |slot, name: &str, ty, shape: &[usize], unit, causality, rows: &[String], description: &str| {
         if shape.contains(&0) {
             return;
         }
@@ -151,16 +129,7 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
     use Causality::{CalculatedParameter, Independent, Input, Output, Parameter};
     use Type::{Boolean, Float64, Int32};
     let no = &[][..];
-    add(
-        Slot::Time,
-        "time",
-        Float64,
-        no,
-        "s",
-        Independent,
-        no_rows(),
-        "Simulation time",
-    );
+    add(Slot::Time, "time", Float64, no, "s", Independent, no_rows(), "Simulation time");
     add(
         Slot::BoneTranslation,
         "bone.translation",
@@ -221,26 +190,8 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
         &parts.pressures,
         "Pressure of each pressure load; positive pushes into the tissue and follows the surface",
     );
-    add(
-        Slot::Gravity,
-        "gravity",
-        Float64,
-        &[3],
-        "m/s2",
-        Parameter,
-        no_rows(),
-        "Acceleration of gravity",
-    );
-    add(
-        Slot::BonePivot,
-        "bone.pivot",
-        Float64,
-        &[n, 3],
-        "m",
-        Parameter,
-        &bones,
-        "Rest position of each bone's pivot",
-    );
+    add(Slot::Gravity, "gravity", Float64, &[3], "m/s2", Parameter, no_rows(), "Acceleration of gravity");
+    add(Slot::BonePivot, "bone.pivot", Float64, &[n, 3], "m", Parameter, &bones, "Rest position of each bone's pivot");
     add(
         Slot::SkinPosition,
         "skin.position",
@@ -346,27 +297,9 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
         no_rows(),
         "Whether the last step met its tolerance",
     );
-    add(
-        Slot::EnergyElastic,
-        "energy.elastic",
-        Float64,
-        no,
-        "J",
-        Output,
-        no_rows(),
-        "Strain energy of the tissue",
-    );
+    add(Slot::EnergyElastic, "energy.elastic", Float64, no, "J", Output, no_rows(), "Strain energy of the tissue");
     if dynamic {
-        add(
-            Slot::EnergyKinetic,
-            "energy.kinetic",
-            Float64,
-            no,
-            "J",
-            Output,
-            no_rows(),
-            "Kinetic energy of the tissue",
-        );
+        add(Slot::EnergyKinetic, "energy.kinetic", Float64, no, "J", Output, no_rows(), "Kinetic energy of the tissue");
     }
     add(
         Slot::MinDetF,
@@ -410,20 +343,8 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
     );
     for (b, bone) in parts.bones.iter().enumerate() {
         let name = format!("bone.{}.displacement", bone.name);
-        let text = format!(
-            "Displacement of each node of bone {}, in the order of its node set",
-            bone.name
-        );
-        add(
-            Slot::BoneNodal(b as u32),
-            &name,
-            Float64,
-            &[bone.nodes.len(), 3],
-            "m",
-            Input,
-            no_rows(),
-            &text,
-        );
+        let text = format!("Displacement of each node of bone {}, in the order of its node set", bone.name);
+        add(Slot::BoneNodal(b as u32), &name, Float64, &[bone.nodes.len(), 3], "m", Input, no_rows(), &text);
     }
     ports
 }
@@ -442,12 +363,7 @@ impl Model {
             return format!("input {k}");
         };
         match port.shape.as_slice() {
-            [_, columns] => format!(
-                "{}[{},{}]",
-                port.name,
-                within / columns + 1,
-                within % columns + 1
-            ),
+            [_, columns] => format!("{}[{},{}]", port.name, within / columns + 1, within % columns + 1),
             _ => format!("{}[{}]", port.name, within + 1),
         }
     }

@@ -97,15 +97,8 @@ impl State {
         let n = parts.bones.len();
         State {
             t: 0.0,
-            config: Configuration {
-                x: parts.mesh.nodes.clone(),
-                poses: vec![Pose::REST; n],
-            },
-            v: if parts.inertia.is_some() {
-                vec![Vec3::zeros(); parts.mesh.nodes.len()]
-            } else {
-                Vec::new()
-            },
+            config: Configuration { x: parts.mesh.nodes.clone(), poses: vec![Pose::REST; n] },
+            v: if parts.inertia.is_some() { vec![Vec3::zeros(); parts.mesh.nodes.len()] } else { Vec::new() },
             inputs: parts.start.clone(),
             applied: rest_inputs(model),
             linearisation: None,
@@ -174,10 +167,7 @@ impl State {
         }
         let found = head.u32()?;
         if found != FORMAT {
-            return Err(StateError::Format {
-                found,
-                wanted: FORMAT,
-            });
+            return Err(StateError::Format { found, wanted: FORMAT });
         }
         let checksum = head.raw(32)?;
         let body = head.raw(head.left())?;
@@ -187,21 +177,14 @@ impl State {
         let mut r = Reader::new(body);
         let token = r.text()?;
         if token != model.token() {
-            return Err(StateError::Model {
-                found: token,
-                wanted: model.token().into(),
-            });
+            return Err(StateError::Model { found: token, wanted: model.token().into() });
         }
         let parts = model.parts();
         let (n, n_bones) = (parts.mesh.nodes.len(), parts.bones.len());
         let n_inputs = parts.layout.len();
         let t = r.f64()?;
         let config = take_config(&mut r, n, n_bones)?;
-        let v = take_vectors(
-            &mut r,
-            "velocities",
-            if parts.inertia.is_some() { n } else { 0 },
-        )?;
+        let v = take_vectors(&mut r, "velocities", if parts.inertia.is_some() { n } else { 0 })?;
         let inputs = take_f64s(&mut r, "inputs", n_inputs)?;
         let applied = take_f64s(&mut r, "inputs", n_inputs)?;
         let reaction_force = take_vectors(&mut r, "reactions", n_bones)?;
@@ -218,11 +201,7 @@ impl State {
             })),
         };
         let [residual, elastic, kinetic, min_det_f, max_stretch] = scalars[..] else {
-            return Err(StateError::Length {
-                what: "diagnostics",
-                found: scalars.len(),
-                wanted: 5,
-            });
+            return Err(StateError::Length { what: "diagnostics", found: scalars.len(), wanted: 5 });
         };
         let outputs = Outputs {
             reaction_force,
@@ -235,15 +214,7 @@ impl State {
             min_det_f,
             max_stretch,
         };
-        Ok(State {
-            t,
-            config,
-            v,
-            inputs,
-            applied,
-            linearisation,
-            outputs,
-        })
+        Ok(State { t, config, v, inputs, applied, linearisation, outputs })
     }
 }
 
@@ -260,10 +231,7 @@ fn rest_inputs(model: &Model) -> Vec<f64> {
 
 fn put_vectors(w: &mut Writer, vectors: &[Vec3]) {
     w.len(vectors.len());
-    vectors
-        .iter()
-        .flat_map(|v| v.iter())
-        .for_each(|c| w.f64(*c));
+    vectors.iter().flat_map(|v| v.iter()).for_each(|c| w.f64(*c));
 }
 
 fn put_config(w: &mut Writer, config: &Configuration) {
@@ -275,27 +243,13 @@ fn put_config(w: &mut Writer, config: &Configuration) {
 }
 
 fn expect_len(what: &'static str, found: usize, wanted: usize) -> Result<(), StateError> {
-    if found == wanted {
-        Ok(())
-    } else {
-        Err(StateError::Length {
-            what,
-            found,
-            wanted,
-        })
-    }
+    if found == wanted { Ok(()) } else { Err(StateError::Length { what, found, wanted }) }
 }
 
-fn take_vectors(
-    r: &mut Reader,
-    what: &'static str,
-    wanted: usize,
-) -> Result<Vec<Vec3>, StateError> {
+fn take_vectors(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec<Vec3>, StateError> {
     let n = r.len(24)?;
     expect_len(what, n, wanted)?;
-    (0..n)
-        .map(|_| Ok(Vec3::new(r.f64()?, r.f64()?, r.f64()?)))
-        .collect()
+    (0..n).map(|_| Ok(Vec3::new(r.f64()?, r.f64()?, r.f64()?))).collect()
 }
 
 fn take_f64s(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec<f64>, StateError> {

@@ -77,28 +77,15 @@ impl Workspace {
             X,
             pivots: &pivots,
             wrenches: &wrenches,
-            at: At {
-                t: 0.0,
-                dt: 0.0,
-                inputs: &parts.start,
-                x_tilde: X,
-                x_lag: X,
-            },
+            at: At { t: 0.0, dt: 0.0, inputs: &parts.start, x_tilde: X, x_lag: X },
         };
         Workspace {
             minimiser: Minimiser::new(&problem, parts.strategy),
             factored: None,
-            config: Configuration {
-                x: X.clone(),
-                poses: vec![Pose::REST; parts.bones.len()],
-            },
+            config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             v: vec![Vec3::zeros(); if parts.inertia.is_some() { X.len() } else { 0 }],
             inputs: parts.start.clone(),
-            x_tilde: if parts.inertia.is_some() {
-                X.clone()
-            } else {
-                Vec::new()
-            },
+            x_tilde: if parts.inertia.is_some() { X.clone() } else { Vec::new() },
             u: vec![Vec3::zeros(); model.dofs().prescribed.len()],
             pivots,
             wrenches,
@@ -111,24 +98,13 @@ impl Workspace {
 }
 
 /// Seeks the equilibrium at the start inputs, or checks that rest is where the scene starts.
-pub(super) fn initialise(
-    model: &Model,
-    state: &mut State,
-    work: &mut Workspace,
-) -> Result<StepReport, SimError> {
-    if model
-        .parts()
-        .inertia
-        .as_ref()
-        .is_some_and(|i| i.start_at_rest)
-    {
+pub(super) fn initialise(model: &Model, state: &mut State, work: &mut Workspace) -> Result<StepReport, SimError> {
+    if model.parts().inertia.as_ref().is_some_and(|i| i.start_at_rest) {
         check_inputs(model, &state.inputs)?;
         read_pivots(model, &state.inputs, &mut work.pivots);
         work.inputs.copy_from_slice(&state.inputs);
         place_bones(model, &work.inputs, &mut work.config);
-        if let Some(bone) =
-            (0..model.parts().bones.len()).find(|&b| work.config.poses[b] != Pose::REST)
-        {
+        if let Some(bone) = (0..model.parts().bones.len()).find(|&b| work.config.poses[b] != Pose::REST) {
             return Err(SimError::NotAtRest(model.parts().bones[bone].name.clone()));
         }
         state.applied.copy_from_slice(&state.inputs);
@@ -143,12 +119,7 @@ pub(super) fn initialise(
 }
 
 /// Moves `state` on by `dt` seconds, or leaves it as it is.
-pub(super) fn advance(
-    model: &Model,
-    state: &mut State,
-    work: &mut Workspace,
-    dt: f64,
-) -> Result<StepReport, SimError> {
+pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> Result<StepReport, SimError> {
     check_inputs(model, &state.inputs)?;
     read_pivots(model, &state.inputs, &mut work.pivots);
     work.config.copy_from(&state.config);
@@ -157,35 +128,15 @@ pub(super) fn advance(
     let mut linearisation = state.linearisation.clone();
     let (mut done, mut piece) = (0.0, 1.0);
     while done < 1.0 {
-        let to: f64 = if done + piece >= 1.0 {
-            1.0
-        } else {
-            done + piece
-        };
-        for ((now, from), last) in work
-            .inputs
-            .iter_mut()
-            .zip(&state.applied)
-            .zip(&state.inputs)
-        {
-            *now = if to == 1.0 {
-                *last
-            } else {
-                from + to * (last - from)
-            };
+        let to: f64 = if done + piece >= 1.0 { 1.0 } else { done + piece };
+        for ((now, from), last) in work.inputs.iter_mut().zip(&state.applied).zip(&state.inputs) {
+            *now = if to == 1.0 { *last } else { from + to * (last - from) };
         }
         read_wrenches(model, &work.inputs, &mut work.wrenches);
         // The piece starts from what the pieces before it left in `work`; a failed one is undone below.
         let before = (work.config.clone(), linearisation.clone());
         let t = state.t + to * dt;
-        match step_piece(
-            model,
-            work,
-            &mut linearisation,
-            t,
-            dt * (to - done),
-            &mut report,
-        ) {
+        match step_piece(model, work, &mut linearisation, t, dt * (to - done), &mut report) {
             Ok(()) => {
                 report.substeps += 1;
                 done = to;
@@ -195,12 +146,7 @@ pub(super) fn advance(
                 (work.config, linearisation) = before;
                 piece *= 0.5;
                 if piece < SMALLEST_PIECE {
-                    return Err(SimError::Solve {
-                        t: state.t,
-                        dt,
-                        cuts: (1.0 / SMALLEST_PIECE) as u32,
-                        source,
-                    });
+                    return Err(SimError::Solve { t: state.t, dt, cuts: (1.0 / SMALLEST_PIECE) as u32, source });
                 }
             }
         }
@@ -255,51 +201,16 @@ fn step_piece(
 ) -> Result<(), SolveError> {
     let parts = model.parts();
     let dofs = model.dofs();
-    let Workspace {
-        minimiser,
-        factored,
-        config,
-        v,
-        inputs,
-        x_tilde,
-        pivots,
-        u,
-        wrenches,
-    } = work;
+    let Workspace { minimiser, factored, config, v, inputs, x_tilde, pivots, u, wrenches } = work;
     for ((y, x), v) in x_tilde.iter_mut().zip(&config.x).zip(&*v) {
         *y = x + dt * v;
     }
-    let at = At {
-        t,
-        dt,
-        inputs,
-        x_tilde,
-        x_lag: &[],
-    };
-    let problem = Problem {
-        terms: &parts.terms,
-        dofs,
-        X: &parts.mesh.nodes,
-        pivots,
-        wrenches,
-        at,
-    };
+    let at = At { t, dt, inputs, x_tilde, x_lag: &[] };
+    let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
     let inverted_before = strain_of(model, &config.x).min_det_f <= 0.0;
-    let start = if parts.inertia.is_some() {
-        config.x.clone()
-    } else {
-        Vec::new()
-    };
+    let start = if parts.inertia.is_some() { config.x.clone() } else { Vec::new() };
 
-    restore_factor(
-        model,
-        &problem,
-        minimiser,
-        factored,
-        linearisation,
-        config,
-        report,
-    )?;
+    restore_factor(model, &problem, minimiser, factored, linearisation, config, report)?;
     place_bones(model, inputs, config);
     target_increments(model, inputs, pivots, config, u);
     if !problem.is_quadratic() {
@@ -313,17 +224,10 @@ fn step_piece(
     let outcome = minimiser.minimise(&problem, config)?;
     report.count(&outcome);
     if !problem.is_quadratic() && !inverted_before && strain_of(model, &config.x).min_det_f <= 0.0 {
-        return Err(SolveError::NotFinite(
-            "the step would turn elements inside out",
-        ));
+        return Err(SolveError::NotFinite("the step would turn elements inside out"));
     }
     if outcome.factorisations > 0 {
-        let made = Linearisation {
-            config: minimiser.factored_at().clone(),
-            t,
-            dt,
-            inputs: inputs.clone(),
-        };
+        let made = Linearisation { config: minimiser.factored_at().clone(), t, dt, inputs: inputs.clone() };
         let made = Arc::new(made);
         *factored = Some(made.clone());
         *linearisation = Some(made);
@@ -352,16 +256,9 @@ fn restore_factor(
             || (l.dt == 0.0) == (dt == 0.0) && (dt == 0.0 || (l.dt / dt).ln().abs() <= DT_DRIFT)
     };
     if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
-        let same = factored
-            .as_ref()
-            .is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
+        let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
         if !(same && minimiser.is_factored()) {
-            let at = At {
-                t: wanted.t,
-                dt: wanted.dt,
-                inputs: &wanted.inputs,
-                ..problem.at
-            };
+            let at = At { t: wanted.t, dt: wanted.dt, inputs: &wanted.inputs, ..problem.at };
             *factored = None;
             minimiser.linearise(&Problem { at, ..*problem }, &wanted.config)?;
             *factored = Some(wanted.clone());
@@ -371,12 +268,8 @@ fn restore_factor(
     *factored = None;
     minimiser.linearise(problem, config)?;
     report.factorisations += 1;
-    let made = Arc::new(Linearisation {
-        config: config.clone(),
-        t: problem.at.t,
-        dt,
-        inputs: problem.at.inputs.to_vec(),
-    });
+    let made =
+        Arc::new(Linearisation { config: config.clone(), t: problem.at.t, dt, inputs: problem.at.inputs.to_vec() });
     *factored = Some(made.clone());
     *linearisation = Some(made);
     Ok(())
@@ -389,26 +282,16 @@ fn frame(factored: Option<&Linearisation>, config: &Configuration) -> Mat3 {
     };
     let (R, ..) = best_fit(l.config.x.iter().copied(), config.x.iter().copied());
     // |R - I|^2 = 2 angle^2 for small angles.
-    if (R - Mat3::identity()).norm_squared() < 2.0 * FRAME_THRESHOLD {
-        Mat3::identity()
-    } else {
-        R
-    }
+    if (R - Mat3::identity()).norm_squared() < 2.0 * FRAME_THRESHOLD { Mat3::identity() } else { R }
 }
 
 /// Moves everything along with the bones where they move as one; `u` keeps what is left of their motion.
 fn move_along(prescribed: &[u32], config: &mut Configuration, u: &mut [Vec3]) {
     let from = prescribed.iter().map(|&a| config.x[a as usize]);
-    let to = prescribed
-        .iter()
-        .zip(&*u)
-        .map(|(&a, u)| config.x[a as usize] + u);
+    let to = prescribed.iter().zip(&*u).map(|(&a, u)| config.x[a as usize] + u);
     let (R, a, c) = best_fit(from.clone(), to.clone());
     let moved = |x: Vec3| c + R * (x - a);
-    let left: f64 = from
-        .zip(to)
-        .map(|(x, y)| (y - moved(x)).norm_squared())
-        .sum();
+    let left: f64 = from.zip(to).map(|(x, y)| (y - moved(x)).norm_squared()).sum();
     let all: f64 = u.iter().map(|u| u.norm_squared()).sum();
     if all == 0.0 || left > RIGID_REMAINDER * RIGID_REMAINDER * all {
         return;
@@ -423,17 +306,11 @@ fn move_along(prescribed: &[u32], config: &mut Configuration, u: &mut [Vec3]) {
 }
 
 fn strain_of(model: &Model, x: &[Vec3]) -> Strain {
-    model
-        .parts()
-        .terms
-        .iter()
-        .fold(Strain::NONE, |s, t| s.and(t.strain(x)))
+    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(x)))
 }
 
 fn input3(inputs: &[f64], first: Option<usize>, row: usize) -> Vec3 {
-    first.map_or(Vec3::zeros(), |f| {
-        Vec3::from_column_slice(&inputs[f + 3 * row..f + 3 * row + 3])
-    })
+    first.map_or(Vec3::zeros(), |f| Vec3::from_column_slice(&inputs[f + 3 * row..f + 3 * row + 3]))
 }
 
 fn read_pivots(model: &Model, inputs: &[f64], pivots: &mut [Vec3]) {
@@ -445,41 +322,25 @@ fn read_pivots(model: &Model, inputs: &[f64], pivots: &mut [Vec3]) {
 
 fn read_wrenches(model: &Model, inputs: &[f64], wrenches: &mut [(Vec3, Vec3)]) {
     let layout = &model.parts().layout;
-    let (force, torque) = (
-        layout.first(Slot::BoneForce),
-        layout.first(Slot::BoneTorque),
-    );
+    let (force, torque) = (layout.first(Slot::BoneForce), layout.first(Slot::BoneTorque));
     for (body, wrench) in model.dofs().bodies.iter().zip(wrenches) {
-        *wrench = (
-            input3(inputs, force, body.bone),
-            input3(inputs, torque, body.bone),
-        );
+        *wrench = (input3(inputs, force, body.bone), input3(inputs, torque, body.bone));
     }
 }
 
 /// Writes the poses that the inputs ask for; nodes stay where they are.
 fn place_bones(model: &Model, inputs: &[f64], config: &mut Configuration) {
     let layout = &model.parts().layout;
-    let (translation, rotation) = (
-        layout.first(Slot::BoneTranslation),
-        layout.first(Slot::BoneRotation),
-    );
+    let (translation, rotation) = (layout.first(Slot::BoneTranslation), layout.first(Slot::BoneRotation));
     for (b, bone) in model.parts().bones.iter().enumerate() {
         if bone.drive == Drive::Pose {
-            config.poses[b] =
-                Pose::new(input3(inputs, translation, b), &input3(inputs, rotation, b));
+            config.poses[b] = Pose::new(input3(inputs, translation, b), &input3(inputs, rotation, b));
         }
     }
 }
 
 /// `u`: how far each prescribed node has to go.
-fn target_increments(
-    model: &Model,
-    inputs: &[f64],
-    pivots: &[Vec3],
-    config: &Configuration,
-    u: &mut [Vec3],
-) {
+fn target_increments(model: &Model, inputs: &[f64], pivots: &[Vec3], config: &Configuration, u: &mut [Vec3]) {
     let parts = model.parts();
     for (b, bone) in parts.bones.iter().enumerate() {
         let displacement = parts.layout.first(Slot::BoneNodal(b as u32));
@@ -500,10 +361,7 @@ fn target_increments(
 /// Every input must be finite, and none may ask a bone for what its drive does not do.
 fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
     if let Some((k, value)) = inputs.iter().enumerate().find(|(_, v)| !v.is_finite()) {
-        return Err(SimError::NotFinite {
-            name: model.input_name(k),
-            value: *value,
-        });
+        return Err(SimError::NotFinite { name: model.input_name(k), value: *value });
     }
     let parts = model.parts();
     for (slots, drive) in [
@@ -511,12 +369,7 @@ fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
         ([Slot::BoneForce, Slot::BoneTorque], Drive::Force),
     ] {
         for first in slots.iter().filter_map(|s| parts.layout.first(*s)) {
-            for (b, bone) in parts
-                .bones
-                .iter()
-                .enumerate()
-                .filter(|(_, bone)| bone.drive != drive)
-            {
+            for (b, bone) in parts.bones.iter().enumerate().filter(|(_, bone)| bone.drive != drive) {
                 if let Some(k) = (first + 3 * b..first + 3 * b + 3).find(|&k| inputs[k] != 0.0) {
                     return Err(SimError::NotDriven {
                         name: model.input_name(k),
@@ -532,22 +385,13 @@ fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
 }
 
 /// Tells of bones that moved apart across a single element.
-fn warn_of_jumps(
-    model: &Model,
-    before: &Configuration,
-    after: &Configuration,
-    report: &mut StepReport,
-) {
+fn warn_of_jumps(model: &Model, before: &Configuration, after: &Configuration, report: &mut StepReport) {
     let X = &model.mesh().nodes;
     let jump = |x: &Configuration, a: u32, b: u32| {
         let (a, b) = (a as usize, b as usize);
         ((x.x[a] - X[a]) - (x.x[b] - X[b])).norm() / (X[a] - X[b]).norm()
     };
-    let worst = model
-        .osteotomy()
-        .iter()
-        .map(|&(a, b)| (jump(after, a, b), a, b))
-        .max_by(|p, q| p.0.total_cmp(&q.0));
+    let worst = model.osteotomy().iter().map(|&(a, b)| (jump(after, a, b), a, b)).max_by(|p, q| p.0.total_cmp(&q.0));
     let Some((ratio, a, b)) = worst else { return };
     if ratio > LARGEST_JUMP && jump(before, a, b) <= LARGEST_JUMP {
         let x = X[a as usize];
@@ -581,12 +425,8 @@ fn read_outputs(model: &Model, state: &mut State, work: &Workspace, report: &Ste
     o.elastic = report.elastic;
     o.min_det_f = report.min_det_f;
     o.max_stretch = report.max_stretch;
-    o.kinetic = parts.inertia.as_ref().map_or(0.0, |inertia| {
-        0.5 * inertia
-            .m
-            .iter()
-            .zip(&state.v)
-            .map(|(m, v)| m * v.norm_squared())
-            .sum::<f64>()
-    });
+    o.kinetic = parts
+        .inertia
+        .as_ref()
+        .map_or(0.0, |inertia| 0.5 * inertia.m.iter().zip(&state.v).map(|(m, v)| m * v.norm_squared()).sum::<f64>());
 }

@@ -3,8 +3,7 @@
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
-    factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
@@ -29,10 +28,7 @@ impl Cholesky {
         let n = 3 * pattern.n();
         let scalar = scalar_pattern(pattern);
         let order = nested_dissection(pattern).map(|blocks| {
-            let new_to_old: Vec<u32> = blocks
-                .iter()
-                .flat_map(|b| [3 * b, 3 * b + 1, 3 * b + 2])
-                .collect();
+            let new_to_old: Vec<u32> = blocks.iter().flat_map(|b| [3 * b, 3 * b + 1, 3 * b + 2]).collect();
             let mut old_to_new = vec![0u32; n];
             for (new, &old) in new_to_old.iter().enumerate() {
                 old_to_new[old as usize] = new as u32;
@@ -40,18 +36,12 @@ impl Cholesky {
             (new_to_old, old_to_new)
         });
         let ordering = match &order {
-            Some((forward, inverse)) => {
-                SymmetricOrdering::Custom(PermRef::new_checked(forward, inverse, n))
-            }
+            Some((forward, inverse)) => SymmetricOrdering::Custom(PermRef::new_checked(forward, inverse, n)),
             None => SymmetricOrdering::Amd,
         };
-        let symbolic = factorize_symbolic_cholesky(
-            scalar.as_ref(),
-            Side::Lower,
-            ordering,
-            CholeskySymbolicParams::default(),
-        )
-        .expect("a mesh graph's factor fits the index type and memory");
+        let symbolic =
+            factorize_symbolic_cholesky(scalar.as_ref(), Side::Lower, ordering, CholeskySymbolicParams::default())
+                .expect("a mesh graph's factor fits the index type and memory");
         let scratch = StackReq::or(
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
@@ -88,9 +78,7 @@ impl LinearSolver for Cholesky {
             )
             .map(drop)
             .map_err(|e| match e {
-                faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => {
-                    index / 3
-                }
+                faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => index / 3,
             })
     }
 
@@ -164,9 +152,7 @@ mod tests {
                 };
             }
         }
-        let x: Vec<Vec3> = (0..n)
-            .map(|i| Vec3::new(i as f64, 1.0, -0.5 * i as f64))
-            .collect();
+        let x: Vec<Vec3> = (0..n).map(|i| Vec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
         let mut b = vec![Vec3::zeros(); n];
         A.multiply(&x, &mut b);
         let mut solver = Cholesky::analyse(&A.pattern);

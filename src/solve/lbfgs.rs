@@ -29,17 +29,8 @@ pub(super) fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
 
 impl Lbfgs {
     pub fn new(memory: usize, n: usize) -> Lbfgs {
-        let pair = || Pair {
-            s: vec![Vec3::zeros(); n],
-            y: vec![Vec3::zeros(); n],
-            rho: 0.0,
-            alpha: 0.0,
-        };
-        Lbfgs {
-            pairs: (0..memory).map(|_| pair()).collect(),
-            used: 0,
-            next: 0,
-        }
+        let pair = || Pair { s: vec![Vec3::zeros(); n], y: vec![Vec3::zeros(); n], rho: 0.0, alpha: 0.0 };
+        Lbfgs { pairs: (0..memory).map(|_| pair()).collect(), used: 0, next: 0 }
     }
 
     pub fn is_empty(&self) -> bool {

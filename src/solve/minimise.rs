@@ -72,10 +72,8 @@ impl Minimiser {
     pub fn new(problem: &Problem, strategy: Strategy) -> Minimiser {
         let assembly = Assembly::new(problem.terms, problem.dofs);
         let n = problem.dofs.n_blocks();
-        let config = Configuration {
-            x: problem.X.to_vec(),
-            poses: vec![crate::math::Pose::REST; problem.pivots.len()],
-        };
+        let config =
+            Configuration { x: problem.X.to_vec(), poses: vec![crate::math::Pose::REST; problem.pivots.len()] };
         Minimiser {
             cholesky: Cholesky::analyse(&assembly.K.pattern),
             assembly,
@@ -122,11 +120,7 @@ impl Minimiser {
     ///
     /// # Errors
     /// [`SolveError::Singular`] if even the projected stiffness is not positive definite.
-    pub fn linearise(
-        &mut self,
-        problem: &Problem,
-        config: &Configuration,
-    ) -> Result<(), SolveError> {
+    pub fn linearise(&mut self, problem: &Problem, config: &Configuration) -> Result<(), SolveError> {
         self.lag.copy_from(config);
         self.factored_at.copy_from(config);
         problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
@@ -141,10 +135,7 @@ impl Minimiser {
                     return Ok(());
                 }
                 Err(block) if curvature == Curvature::Projected => {
-                    return Err(SolveError::Singular {
-                        block,
-                        n_blocks: problem.dofs.n_blocks(),
-                    });
+                    return Err(SolveError::Singular { block, n_blocks: problem.dofs.n_blocks() });
                 }
                 Err(_) => {}
             }
@@ -155,17 +146,7 @@ impl Minimiser {
     /// Moves `config` to where the factor at hand expects the equilibrium once the prescribed nodes have gone by `u`:
     /// `K d = -(g + K_p u)`. The prescribed nodes of `config` are moved, too.
     pub fn predict(&mut self, problem: &Problem, config: &mut Configuration, u: &[Vec3]) {
-        let Minimiser {
-            assembly,
-            cholesky,
-            frame,
-            lag,
-            nodal,
-            g,
-            d,
-            trial,
-            ..
-        } = self;
+        let Minimiser { assembly, cholesky, frame, lag, nodal, g, d, trial, .. } = self;
         lag.copy_from(config);
         problem.gradient(config, lag, nodal, g);
         d.fill(Vec3::zeros());
@@ -179,9 +160,7 @@ impl Minimiser {
         for (&a, u) in problem.dofs.prescribed.iter().zip(u) {
             trial.x[a as usize] += u;
         }
-        problem
-            .dofs
-            .retract(problem.X, problem.pivots, config, 1.0, d, trial);
+        problem.dofs.retract(problem.X, problem.pivots, config, 1.0, d, trial);
         config.copy_from(trial);
     }
 
@@ -189,35 +168,22 @@ impl Minimiser {
     ///
     /// # Errors
     /// [`SolveError`]; `config` is then not an equilibrium.
-    pub fn minimise(
-        &mut self,
-        problem: &Problem,
-        config: &mut Configuration,
-    ) -> Result<Outcome, SolveError> {
+    pub fn minimise(&mut self, problem: &Problem, config: &mut Configuration) -> Result<Outcome, SolveError> {
         let lagged = problem.is_lagged();
         let newton = self.strategy.memory == 0;
-        let mut outcome = Outcome {
-            iterations: 0,
-            factorisations: 0,
-            correction: f64::INFINITY,
-            residual: f64::INFINITY,
-        };
+        let mut outcome =
+            Outcome { iterations: 0, factorisations: 0, correction: f64::INFINITY, residual: f64::INFINITY };
         let mut age = 0;
         self.memory.forget();
         self.lag.copy_from(config);
         self.trial.copy_from(config);
         let mut energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
         if !energy.is_finite() {
-            return Err(SolveError::NotFinite(
-                "some element is inverted or a position is not a number",
-            ));
+            return Err(SolveError::NotFinite("some element is inverted or a position is not a number"));
         }
         loop {
             let stale = newton && outcome.iterations > 0 && !problem.is_quadratic();
-            if !self.factored
-                || stale
-                || age >= self.strategy.refresh_after.max(2) && !problem.is_quadratic()
-            {
+            if !self.factored || stale || age >= self.strategy.refresh_after.max(2) && !problem.is_quadratic() {
                 self.linearise(problem, config)?;
                 outcome.factorisations += 1;
                 age = 0;
@@ -283,14 +249,7 @@ impl Minimiser {
 
     /// `d = -H g`; returns the slope `g.d`.
     fn direction(&mut self) -> f64 {
-        let Minimiser {
-            cholesky,
-            memory,
-            frame,
-            g,
-            d,
-            ..
-        } = self;
+        let Minimiser { cholesky, memory, frame, g, d, .. } = self;
         d.copy_from_slice(g);
         memory.apply(d, |q| {
             turn(&frame.transpose(), q);
@@ -305,28 +264,14 @@ impl Minimiser {
 
     /// Shortens the step along `d` until the energy falls enough; leaves the new point in `trial`, its gradient in
     /// `g_trial`. Returns the length and the energy, or `None` if no length serves.
-    fn search(
-        &mut self,
-        problem: &Problem,
-        config: &Configuration,
-        energy: f64,
-        slope: f64,
-    ) -> Option<(f64, f64)> {
+    fn search(&mut self, problem: &Problem, config: &Configuration, energy: f64, slope: f64) -> Option<(f64, f64)> {
         if slope >= 0.0 || slope.is_nan() {
             return None;
         }
         let mut alpha = 1.0;
         for _ in 0..=MAX_SHORTENINGS {
-            problem.dofs.retract(
-                problem.X,
-                problem.pivots,
-                config,
-                alpha,
-                &self.d,
-                &mut self.trial,
-            );
-            let tried =
-                problem.gradient(&self.trial, &self.lag, &mut self.nodal, &mut self.g_trial);
+            problem.dofs.retract(problem.X, problem.pivots, config, alpha, &self.d, &mut self.trial);
+            let tried = problem.gradient(&self.trial, &self.lag, &mut self.nodal, &mut self.g_trial);
             let noise = ENERGY_NOISE * (energy.abs() + tried.abs());
             if tried <= energy + ARMIJO * alpha * slope {
                 return Some((alpha, tried));
@@ -337,11 +282,7 @@ impl Minimiser {
             }
             // Minimum of the parabola through energy, slope and tried; halved where that says nothing.
             let parabola = -0.5 * slope * alpha * alpha / (tried - energy - slope * alpha);
-            alpha = if parabola.is_finite() {
-                parabola.clamp(0.1 * alpha, 0.5 * alpha)
-            } else {
-                0.5 * alpha
-            };
+            alpha = if parabola.is_finite() { parabola.clamp(0.1 * alpha, 0.5 * alpha) } else { 0.5 * alpha };
         }
         None
     }

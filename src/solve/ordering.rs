@@ -39,11 +39,7 @@ pub fn nested_dissection(pattern: &Pattern) -> Option<Vec<u32>> {
     }
     let graph = feral_metis::CscPattern::new(n, &start, &row)?;
     let order = feral_metis::metis_order(&graph).ok()?;
-    let order: Vec<u32> = order
-        .into_iter()
-        .map(u32::try_from)
-        .collect::<Result<_, _>>()
-        .ok()?;
+    let order: Vec<u32> = order.into_iter().map(u32::try_from).collect::<Result<_, _>>().ok()?;
     is_permutation(&order, n).then_some(order)
 }
 
@@ -59,8 +55,5 @@ fn each_edge(pattern: &Pattern, mut edge: impl FnMut(usize, usize)) {
 
 fn is_permutation(order: &[u32], n: usize) -> bool {
     let mut seen = vec![false; n];
-    order.len() == n
-        && order
-            .iter()
-            .all(|&k| (k as usize) < n && !std::mem::replace(&mut seen[k as usize], true))
+    order.len() == n && order.iter().all(|&k| (k as usize) < n && !std::mem::replace(&mut seen[k as usize], true))
 }

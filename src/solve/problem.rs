@@ -22,19 +22,12 @@ pub struct Problem<'a> {
 
 impl Problem<'_> {
     fn at<'b>(&'b self, lag: &'b Configuration) -> At<'b> {
-        At {
-            x_lag: &lag.x,
-            ..self.at
-        }
+        At { x_lag: &lag.x, ..self.at }
     }
 
     /// Whether some force follows the deformation and is brought up to date after each iteration.
     pub fn is_lagged(&self) -> bool {
-        self.terms.iter().any(|t| t.is_lagged())
-            || self
-                .wrenches
-                .iter()
-                .any(|(_, torque)| *torque != Vec3::zeros())
+        self.terms.iter().any(|t| t.is_lagged()) || self.wrenches.iter().any(|(_, torque)| *torque != Vec3::zeros())
     }
 
     /// Whether the stiffness is the same everywhere.
@@ -45,28 +38,14 @@ impl Problem<'_> {
     /// Energy, J.
     pub fn energy(&self, config: &Configuration, lag: &Configuration) -> f64 {
         let at = self.at(lag);
-        self.terms
-            .iter()
-            .map(|t| t.energy(&at, &config.x))
-            .sum::<f64>()
-            + self.body_energy(config, lag)
+        self.terms.iter().map(|t| t.energy(&at, &config.x)).sum::<f64>() + self.body_energy(config, lag)
     }
 
     /// Energy (J); overwrites the nodal gradient `nodal` and the gradient of the unknowns `g`.
-    pub fn gradient(
-        &self,
-        config: &Configuration,
-        lag: &Configuration,
-        nodal: &mut [Vec3],
-        g: &mut [Vec3],
-    ) -> f64 {
+    pub fn gradient(&self, config: &Configuration, lag: &Configuration, nodal: &mut [Vec3], g: &mut [Vec3]) -> f64 {
         let at = self.at(lag);
         nodal.fill(Vec3::zeros());
-        let energy: f64 = self
-            .terms
-            .iter()
-            .map(|t| t.add_gradient(&at, &config.x, nodal))
-            .sum();
+        let energy: f64 = self.terms.iter().map(|t| t.add_gradient(&at, &config.x, nodal)).sum();
         self.dofs.reduce(nodal, config, self.pivots, g);
         for (body, (force, torque)) in self.dofs.bodies.iter().zip(self.wrenches) {
             let theta = turned(config, lag, body.bone);
@@ -84,27 +63,14 @@ impl Problem<'_> {
         nodal: &[Vec3],
         curvature: crate::fem::Curvature,
     ) {
-        assembly.fill(
-            self.terms,
-            self.dofs,
-            &self.at(config),
-            config,
-            self.pivots,
-            nodal,
-            curvature,
-        );
+        assembly.fill(self.terms, self.dofs, &self.at(config), config, self.pivots, nodal, curvature);
     }
 
     /// The potential `-f.t - tau.theta` of the wrenches, theta counted from the lagged pose.
     fn body_energy(&self, config: &Configuration, lag: &Configuration) -> f64 {
-        let work = self
-            .dofs
-            .bodies
-            .iter()
-            .zip(self.wrenches)
-            .map(|(body, (force, torque))| {
-                force.dot(&config.poses[body.bone].t) + torque.dot(&turned(config, lag, body.bone))
-            });
+        let work = self.dofs.bodies.iter().zip(self.wrenches).map(|(body, (force, torque))| {
+            force.dot(&config.poses[body.bone].t) + torque.dot(&turned(config, lag, body.bone))
+        });
         -work.sum::<f64>()
     }
 }
