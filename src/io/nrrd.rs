@@ -95,7 +95,11 @@ fn scalar(path: &Path, name: &str) -> Result<Scalar, IoError> {
         "float" => Scalar::F32,
         "double" => Scalar::F64,
         other => {
-            return Err(IoError::unsupported(path, format!("NRRD type `{other}`"), "save it as int16 Hounsfield units"));
+            return Err(IoError::unsupported(
+                path,
+                format!("NRRD type `{other}`"),
+                "save it as int16 Hounsfield units",
+            ));
         }
     })
 }
