@@ -19,3 +19,4 @@ pub mod port;
 pub mod scene;
 pub mod sim;
 pub mod solve;
+pub mod view;
