@@ -1,4 +1,5 @@
 //! What runs leave behind: a table of ports, a ParaView series, a picture.
+#![allow(non_snake_case)]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
