@@ -2,5 +2,7 @@
 mod geometry {
     mod block;
     mod ct_files;
+    mod distance;
+    mod marching_cubes;
     mod mesh_files;
 }
