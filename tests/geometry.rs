@@ -5,4 +5,5 @@ mod geometry {
     mod distance;
     mod marching_cubes;
     mod mesh_files;
+    mod stuffing;
 }

@@ -21,7 +21,7 @@ pub struct Distance {
     pub grid: Grid,
     /// Distances, m.
     pub values: Vec<f32>,
-    /// Whether there is a surface at all; without one every distance is infinite.
+    /// The isosurface itself; without triangles every distance is infinite.
     pub surface: Surface,
 }
 
