@@ -3,6 +3,7 @@ mod geometry {
     mod block;
     mod ct_files;
     mod distance;
+    mod head;
     mod marching_cubes;
     mod mesh_files;
     mod stuffing;

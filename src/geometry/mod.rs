@@ -4,15 +4,19 @@
 //! same bits. Lengths are metres; only CT samples are Hounsfield units.
 #![forbid(unsafe_code)]
 
+mod assemble;
 mod block;
 mod distance;
 mod error;
 mod field;
+pub mod head;
+mod label;
 mod lattice;
 mod marching_cubes;
 mod nearest;
 mod quality;
 mod repair;
+mod shapes;
 mod sizing;
 mod stencils;
 mod stuffing;
@@ -21,10 +25,13 @@ mod tetrahedralise;
 mod topology;
 mod volume;
 
+pub use assemble::{CUT, FREE};
 pub use block::{Block, Pattern, block};
 pub use distance::{Distance, Isosurface, unsigned};
 pub use error::MeshingError;
 pub use field::{Ball, Cuboid, Field, gradient};
+pub use head::Head;
+pub use label::{LAYERS, LayerShare, Layers};
 pub use lattice::{Lattice, LatticePlane};
 pub use marching_cubes::marching_cubes;
 pub use nearest::Nearest;
