@@ -5,6 +5,14 @@
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod bytes;
+pub mod effect;
+pub mod energy;
+pub mod fem;
+pub mod geometry;
+pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod port;
+pub mod sim;
+pub mod solve;

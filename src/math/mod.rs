@@ -2,9 +2,21 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case)]
 
+mod pose;
+mod psd;
+mod svd;
+mod tensor;
+
+pub use pose::{Pose, best_fit, exp_rotation, log_rotation};
+pub use psd::clamp_eigenvalues;
+pub use svd::{Svd, polar, svd};
+pub use tensor::{cofactor, d2JdF2, outer, skew, vec9};
+
 /// A point or vector in space, m.
 pub type Vec3 = nalgebra::Vector3<f64>;
 /// A 3x3 matrix, for example the deformation gradient F.
 pub type Mat3 = nalgebra::Matrix3<f64>;
 /// A fourth-order tensor as a 9x9 matrix over `vec(F)`, for example dP/dF.
 pub type Mat9 = nalgebra::SMatrix<f64, 9, 9>;
+/// `vec(F)`: the columns of F one below the other.
+pub type Vec9 = nalgebra::SVector<f64, 9>;

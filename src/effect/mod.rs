@@ -1,0 +1,22 @@
+//! The effects a scene can name, one a file. Each becomes a term of the energy; a missing effect is a missing term.
+#![forbid(unsafe_code)]
+#![allow(non_snake_case)]
+
+mod gravity;
+mod inertia;
+mod load;
+mod pressure;
+mod tissue;
+
+pub use gravity::Gravity;
+pub use inertia::{Inertia, lumped_masses};
+pub use load::DeadLoad;
+pub use pressure::Pressure;
+pub use tissue::{ENERGIES, Elastic, elastic_tissue};
+
+use crate::math::Vec3;
+
+/// Three consecutive inputs as a vector.
+fn input3(inputs: &[f64], first: usize) -> Vec3 {
+    Vec3::new(inputs[first], inputs[first + 1], inputs[first + 2])
+}

@@ -1,0 +1,15 @@
+//! Finite elements: what a term of the energy is, how elements are gathered and scattered, which nodes are unknown.
+#![forbid(unsafe_code)]
+#![allow(non_snake_case)]
+
+mod assemble;
+mod dofs;
+mod matrix;
+mod term;
+mod tet4;
+
+pub use assemble::Assembly;
+pub use dofs::{Configuration, Dofs, RigidBody, Role};
+pub use matrix::{BlockMatrix, CouplingMatrix, Pattern};
+pub use term::{At, Curvature, HessianSink, Kernel, OnElements, Strain, Term};
+pub use tet4::{Tet4, shape_gradients};

@@ -1,0 +1,175 @@
+//! Terms: the summands of the energy that a step minimises, and the crate's only gather/scatter loop.
+
+use crate::math::{Mat3, Vec3};
+
+/// Everything a term sees besides the positions it is evaluated at.
+#[derive(Clone, Copy)]
+pub struct At<'a> {
+    /// Time at the end of the step, s.
+    pub t: f64,
+    /// Length of the step, s; 0 while the start equilibrium is sought.
+    pub dt: f64,
+    /// All input values; a term knows where its own lie.
+    pub inputs: &'a [f64],
+    /// Where inertia alone would carry each node, m; empty in quasi-static scenes.
+    pub x_tilde: &'a [Vec3],
+    /// Positions at which follower loads take their direction, m.
+    pub x_lag: &'a [Vec3],
+}
+
+/// Which Hessian is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Curvature {
+    /// The true second derivative.
+    Exact,
+    /// With negative eigenvalues of each element's material tangent set to zero: always positive semi-definite.
+    Projected,
+}
+
+/// How much the elements of a term are strained.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strain {
+    /// Smallest det F.
+    pub min_det_f: f64,
+    /// Largest principal stretch.
+    pub max_stretch: f64,
+    /// Strain energy, J.
+    pub energy: f64,
+}
+
+impl Strain {
+    /// The strain of no element at all.
+    pub const NONE: Strain = Strain { min_det_f: f64::INFINITY, max_stretch: 0.0, energy: 0.0 };
+
+    /// The strain of both.
+    pub fn and(self, other: Strain) -> Strain {
+        Strain {
+            min_det_f: self.min_det_f.min(other.min_det_f),
+            max_stretch: self.max_stretch.max(other.max_stretch),
+            energy: self.energy + other.energy,
+        }
+    }
+}
+
+/// Takes the Hessian blocks of one clique of nodes.
+pub trait HessianSink {
+    /// Adds the upper triangle of blocks of `nodes`, row by row: (0,0), (0,1), ... (1,1), (1,2), ...
+    fn add(&mut self, nodes: &[u32], upper: &[Mat3]);
+}
+
+/// A summand of the energy. Terms own constants; what evolves lies in [`At`].
+pub trait Term: Send + Sync {
+    /// What it is, for reports.
+    fn name(&self) -> &'static str;
+
+    /// Energy at `x`, J; +inf where undefined.
+    fn energy(&self, at: &At, x: &[Vec3]) -> f64;
+
+    /// Adds the gradient to `g` (N) and returns the energy (J).
+    fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64;
+
+    /// Calls `clique` with every set of nodes that `add_hessian` will hand over, in the same order.
+    fn couplings(&self, clique: &mut dyn FnMut(&[u32]));
+
+    /// Hands the Hessian over, clique by clique.
+    fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink);
+
+    /// Whether its force direction follows `At::x_lag` and must be brought up to date by an outer loop.
+    fn is_lagged(&self) -> bool {
+        false
+    }
+
+    /// Whether its Hessian is the same at every `x` and its gradient affine in `x`.
+    fn is_quadratic(&self) -> bool {
+        false
+    }
+
+    /// Strain at `x`, for terms that have elements.
+    fn strain(&self, _x: &[Vec3]) -> Strain {
+        Strain::NONE
+    }
+}
+
+/// One element's share of a term: local nodes, 3x3 blocks, no global index.
+pub trait Kernel<const N: usize>: Send + Sync {
+    /// What it is, for reports.
+    fn name(&self) -> &'static str;
+    /// Number of elements.
+    fn len(&self) -> usize;
+    /// Whether there is no element.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// Corner nodes of element `e`.
+    fn nodes(&self, e: usize) -> [u32; N];
+    /// Energy of element `e`, J.
+    fn energy(&self, e: usize, x: &[Vec3; N]) -> f64;
+    /// Energy (J) and gradient (N) of element `e`.
+    fn gradient(&self, e: usize, x: &[Vec3; N], g: &mut [Vec3; N]) -> f64;
+    /// Upper triangle of Hessian blocks of element `e`, row by row, N/m.
+    fn hessian(&self, e: usize, x: &[Vec3; N], curvature: Curvature, upper: &mut [Mat3]);
+    /// Strain of element `e`.
+    fn strain(&self, e: usize, x: &[Vec3; N]) -> Strain;
+    /// Whether the energy is quadratic in the positions.
+    fn is_quadratic(&self) -> bool;
+}
+
+/// Upper-triangle blocks of the largest element, the ten-node tetrahedron.
+const MAX_BLOCKS: usize = 55;
+
+/// A kernel summed over its elements. Elements are visited in ascending order, so sums are reproducible to the bit.
+pub struct OnElements<K, const N: usize>(pub K);
+
+impl<K: Kernel<N>, const N: usize> OnElements<K, N> {
+    fn gather(&self, e: usize, x: &[Vec3]) -> ([u32; N], [Vec3; N]) {
+        let nodes = self.0.nodes(e);
+        (nodes, nodes.map(|a| x[a as usize]))
+    }
+}
+
+impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
+    fn name(&self) -> &'static str {
+        self.0.name()
+    }
+
+    fn energy(&self, _at: &At, x: &[Vec3]) -> f64 {
+        (0..self.0.len()).map(|e| self.0.energy(e, &self.gather(e, x).1)).sum()
+    }
+
+    fn add_gradient(&self, _at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
+        let mut sum = 0.0;
+        let mut local = [Vec3::zeros(); N];
+        for e in 0..self.0.len() {
+            let (nodes, x) = self.gather(e, x);
+            sum += self.0.gradient(e, &x, &mut local);
+            for (a, g_a) in nodes.iter().zip(&local) {
+                g[*a as usize] += g_a;
+            }
+        }
+        sum
+    }
+
+    fn couplings(&self, clique: &mut dyn FnMut(&[u32])) {
+        for e in 0..self.0.len() {
+            clique(&self.0.nodes(e));
+        }
+    }
+
+    fn add_hessian(&self, _at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
+        let mut upper = [Mat3::zeros(); MAX_BLOCKS];
+        let upper = &mut upper[..N * (N + 1) / 2];
+        for e in 0..self.0.len() {
+            let (nodes, x) = self.gather(e, x);
+            self.0.hessian(e, &x, curvature, upper);
+            sink.add(&nodes, upper);
+        }
+    }
+
+    fn is_quadratic(&self) -> bool {
+        self.0.is_quadratic()
+    }
+
+    fn strain(&self, x: &[Vec3]) -> Strain {
+        (0..self.0.len()).fold(Strain::NONE, |s, e| s.and(self.0.strain(e, &self.gather(e, x).1)))
+    }
+}

@@ -1,0 +1,41 @@
+//! Why a shape could not be meshed.
+
+use crate::mesh::MeshError;
+
+/// Why a mesh was not made. Nothing was changed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MeshingError {
+    /// A length or count that must be positive is not.
+    #[error("{what} is {found}; it must be positive and finite")]
+    NotPositive {
+        /// What was given: "block size along y".
+        what: String,
+        /// The value found.
+        found: f64,
+    },
+    /// More elements than the 32-bit node numbers of a mesh can hold.
+    #[error(
+        "{what} would need {found} nodes, more than the {limit} that fit a mesh; choose fewer cells or a longer edge"
+    )]
+    TooLarge {
+        /// What was asked for.
+        what: String,
+        /// Nodes it would need.
+        found: u128,
+        /// Most nodes possible.
+        limit: u64,
+    },
+    /// Layer fractions that do not fill a block.
+    #[error(
+        "layer `{name}` brings the sum of the layer fractions to {sum}; each must be positive and the sum at most 1"
+    )]
+    Layers {
+        /// Name of the first layer that does not fit.
+        name: String,
+        /// Sum of the fractions up to and with it.
+        sum: f64,
+    },
+    /// The finished mesh broke a rule every mesh keeps.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}

@@ -1,0 +1,81 @@
+//! Meshes by file extension: `.cutis` (baked), `.vtu`, `.vtk` (VTK), `.msh` (Gmsh).
+
+use std::path::Path;
+
+use super::{IoError, baked, gmsh, vtk};
+use crate::mesh::{MeshError, TetMesh};
+
+const CHOICES: &str = ".cutis, .vtu, .vtk and .msh";
+
+/// Reads a tetrahedral mesh with its regions, node sets and face sets. A foreign file without regions is one region
+/// `tissue`; nodes that no tetrahedron uses are left out.
+///
+/// # Errors
+/// [`IoError`]: unknown extension, unreadable, truncated or malformed file, a mesh that breaks [`TetMesh::checked`].
+pub fn read_mesh(path: &Path) -> Result<TetMesh, IoError> {
+    let kind = extension(path);
+    if !matches!(kind.as_str(), "cutis" | "vtu" | "vtk" | "msh") {
+        return Err(IoError::Extension { path: path.into(), choices: CHOICES });
+    }
+    let bytes = std::fs::read(path).map_err(IoError::file(path))?;
+    let mut mesh = match kind.as_str() {
+        "cutis" => return baked::decode(&bytes, path),
+        "vtu" => vtk::read_vtu(&bytes, path)?,
+        "vtk" => vtk::read_legacy(&bytes, path)?,
+        _ => gmsh::read(&bytes, path)?,
+    };
+    in_range(&mesh).map_err(|source| IoError::Mesh { path: path.into(), source })?;
+    drop_unused(&mut mesh);
+    mesh.checked().map_err(|source| IoError::Mesh { path: path.into(), source })
+}
+
+/// Writes a mesh so that [`read_mesh`] returns the same bits.
+///
+/// # Errors
+/// [`IoError`]: unknown extension, a name the format cannot hold, a file that cannot be written.
+pub fn write_mesh(path: &Path, mesh: &TetMesh) -> Result<(), IoError> {
+    let bytes = match extension(path).as_str() {
+        "cutis" => baked::encode(mesh),
+        "vtu" => vtk::vtu_bytes(mesh, &mesh.nodes, &[], &[]),
+        "vtk" => vtk::legacy_text(mesh).into_bytes(),
+        "msh" => gmsh::text(mesh, path)?.into_bytes(),
+        _ => return Err(IoError::Extension { path: path.into(), choices: CHOICES }),
+    };
+    std::fs::write(path, bytes).map_err(IoError::file(path))
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
+}
+
+fn in_range(mesh: &TetMesh) -> Result<(), MeshError> {
+    let n_nodes = mesh.nodes.len();
+    match mesh.tets.as_flattened().iter().find(|&&a| a as usize >= n_nodes) {
+        Some(&node) => Err(MeshError::NodeOutOfRange { what: "a tetrahedron".into(), node, n_nodes }),
+        None => Ok(()),
+    }
+}
+
+/// Leaves out nodes that no tetrahedron uses, and faces and set members that need them.
+fn drop_unused(mesh: &mut TetMesh) {
+    let mut new = vec![u32::MAX; mesh.nodes.len()];
+    mesh.tets.as_flattened().iter().for_each(|&a| new[a as usize] = 0);
+    if !new.contains(&u32::MAX) {
+        return;
+    }
+    let mut next = 0;
+    for n in new.iter_mut().filter(|n| **n == 0) {
+        *n = next;
+        next += 1;
+    }
+    let at = |a: u32| new.get(a as usize).copied().unwrap_or(u32::MAX);
+    let mut keep = new.iter().map(|&n| n != u32::MAX);
+    mesh.nodes.retain(|_| keep.next() == Some(true));
+    mesh.tets.iter_mut().for_each(|tet| *tet = tet.map(at));
+    for set in &mut mesh.node_sets {
+        set.nodes = set.nodes.iter().map(|&a| at(a)).filter(|&a| a != u32::MAX).collect();
+    }
+    for set in &mut mesh.face_sets {
+        set.triangles = set.triangles.iter().map(|t| t.map(at)).filter(|t| !t.contains(&u32::MAX)).collect();
+    }
+}

@@ -1,0 +1,14 @@
+//! Files in and out: meshes, results for viewers, baked models, CT volumes. The only room that reads the file system.
+#![forbid(unsafe_code)]
+
+mod baked;
+mod error;
+mod gmsh;
+mod mesh;
+mod text;
+mod vtk;
+
+pub use baked::{decode, encode};
+pub use error::IoError;
+pub use mesh::{read_mesh, write_mesh};
+pub use vtk::{Data, write_pvd, write_vtu};

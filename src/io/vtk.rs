@@ -1,0 +1,64 @@
+//! VTK unstructured grids: `.vtu` with raw appended data, legacy `.vtk` in text, `.pvd` time series.
+//!
+//! Source: "VTK File Formats", Kitware, the XML and the legacy chapter. Regions are cell data `region` with their names
+//! in field data, node sets point data `set:<name>`, face sets field data `faces:<name>`.
+
+mod base64;
+mod grid;
+mod legacy;
+mod vtu_read;
+mod vtu_write;
+
+use std::path::Path;
+
+use super::IoError;
+use crate::math::Vec3;
+use crate::mesh::TetMesh;
+
+pub(crate) use legacy::{legacy_text, read_legacy};
+pub(crate) use vtu_read::read_vtu;
+pub(crate) use vtu_write::vtu_bytes;
+
+/// A named field on nodes or tetrahedra: `components` values each, row by row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Data<'a> {
+    /// Name shown by the viewer.
+    pub name: &'a str,
+    /// Values a node or tetrahedron: 1, 3, 9.
+    pub components: usize,
+    /// The values, row by row.
+    pub values: &'a [f64],
+}
+
+/// Writes a mesh at positions `x` (the rest positions or a deformed state) with fields on nodes and tetrahedra.
+///
+/// # Errors
+/// [`IoError::File`] when the file cannot be written.
+///
+/// # Panics
+/// When `x` or a field is not as long as the mesh asks.
+pub fn write_vtu(
+    path: &Path,
+    mesh: &TetMesh,
+    x: &[Vec3],
+    point_data: &[Data],
+    cell_data: &[Data],
+) -> Result<(), IoError> {
+    std::fs::write(path, vtu_bytes(mesh, x, point_data, cell_data)).map_err(IoError::file(path))
+}
+
+/// Writes the `.pvd` index of a time series: time in s and file name (relative to the index) of each step.
+///
+/// # Errors
+/// [`IoError::File`] when the file cannot be written.
+pub fn write_pvd(path: &Path, steps: &[(f64, String)]) -> Result<(), IoError> {
+    let mut out = String::from(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>\n",
+    );
+    for (t, file) in steps {
+        let file = quick_xml::escape::escape(file.as_str());
+        out += &format!("<DataSet timestep=\"{t}\" group=\"\" part=\"0\" file=\"{file}\"/>\n");
+    }
+    out += "</Collection>\n</VTKFile>\n";
+    std::fs::write(path, out).map_err(IoError::file(path))
+}

@@ -1,0 +1,110 @@
+//! What a host sets and gets. Both are copies: nothing is solved, nothing is allocated.
+
+use super::{Sim, SimError};
+use crate::math::{Vec3, log_rotation};
+use crate::port::{Port, Slot, Type};
+
+impl Sim {
+    /// Copies `values` into port `port`, from its element `offset` (row-major) on. They act at the next step.
+    ///
+    /// # Errors
+    /// [`SimError::Port`] if the port cannot be set, [`SimError::Range`] if the values do not fit. Values that are not
+    /// finite are refused by the next step.
+    pub fn set_f64(&mut self, port: usize, offset: usize, values: &[f64]) -> Result<(), SimError> {
+        let p = self.port(port, Type::Float64, "a settable Float64 port", Port::is_settable)?;
+        check_range(p, offset, values.len())?;
+        let first = self.model.parts().layout.first(p.slot).expect("every settable port lies in the layout") + offset;
+        self.state.inputs[first..first + values.len()].copy_from_slice(values);
+        Ok(())
+    }
+
+    /// Copies from port `port`, from its element `offset` (row-major) on: inputs as set last, outputs as of the last
+    /// accepted step.
+    ///
+    /// # Errors
+    /// [`SimError::Port`], [`SimError::Range`].
+    pub fn get_f64(&self, port: usize, offset: usize, out: &mut [f64]) -> Result<(), SimError> {
+        let p = self.port(port, Type::Float64, "a Float64 port", |_| true)?;
+        check_range(p, offset, out.len())?;
+        let o = &self.state.outputs;
+        let rest = &self.model.mesh().nodes;
+        match p.slot {
+            Slot::Time => out.fill(self.state.t),
+            Slot::SkinPosition => gather(self.model.skin(), &self.state.config.x, offset, out),
+            Slot::SkinVelocity => gather(self.model.skin(), &self.state.v, offset, out),
+            Slot::SkinRestPosition => gather(self.model.skin(), rest, offset, out),
+            Slot::MarkerPosition => rows(|k| self.marker(k), offset, out),
+            Slot::BoneReactionForce => rows(|k| o.reaction_force[k], offset, out),
+            Slot::BoneReactionTorque => rows(|k| o.reaction_torque[k], offset, out),
+            Slot::BonePoseTranslation => rows(|k| self.state.config.poses[k].t, offset, out),
+            Slot::BonePoseRotation => rows(|k| log_rotation(&self.state.config.poses[k].R), offset, out),
+            Slot::SolverResidual => out.fill(o.residual),
+            Slot::EnergyElastic => out.fill(o.elastic),
+            Slot::EnergyKinetic => out.fill(o.kinetic),
+            Slot::MinDetF => out.fill(o.min_det_f),
+            Slot::MaxStretch => out.fill(o.max_stretch),
+            input => {
+                let first = self.model.parts().layout.first(input).expect("every other port is an input") + offset;
+                out.copy_from_slice(&self.state.inputs[first..first + out.len()]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Copies from an Int32 port.
+    ///
+    /// # Errors
+    /// [`SimError::Port`], [`SimError::Range`].
+    pub fn get_i32(&self, port: usize, offset: usize, out: &mut [i32]) -> Result<(), SimError> {
+        let p = self.port(port, Type::Int32, "an Int32 port", |_| true)?;
+        check_range(p, offset, out.len())?;
+        match p.slot {
+            Slot::SkinTriangles => out.copy_from_slice(&self.model.skin_triangles()[offset..offset + out.len()]),
+            _ => out.fill(self.state.outputs.iterations as i32),
+        }
+        Ok(())
+    }
+
+    /// Copies from a Boolean port.
+    ///
+    /// # Errors
+    /// [`SimError::Port`], [`SimError::Range`].
+    pub fn get_bool(&self, port: usize, offset: usize, out: &mut [bool]) -> Result<(), SimError> {
+        let p = self.port(port, Type::Boolean, "a Boolean port", |_| true)?;
+        check_range(p, offset, out.len())?;
+        out.fill(self.state.outputs.converged);
+        Ok(())
+    }
+
+    fn port(&self, k: usize, ty: Type, wanted: &'static str, also: impl Fn(&Port) -> bool) -> Result<&Port, SimError> {
+        let ports = self.model.ports();
+        ports.get(k).filter(|p| p.ty == ty && also(p)).ok_or(SimError::Port { port: k, n_ports: ports.len(), wanted })
+    }
+
+    fn marker(&self, k: usize) -> Vec3 {
+        let marker = &self.model.parts().markers[k];
+        marker.nodes.iter().zip(marker.weights).map(|(&a, w)| w * self.state.config.x[a as usize]).sum()
+    }
+}
+
+fn check_range(port: &Port, offset: usize, n: usize) -> Result<(), SimError> {
+    let (len, end) = (port.len(), offset.saturating_add(n));
+    if end <= len { Ok(()) } else { Err(SimError::Range { name: port.name.clone(), len, offset, end }) }
+}
+
+/// Rows of three, flattened, from element `offset` on.
+fn rows(row: impl Fn(usize) -> Vec3, offset: usize, out: &mut [f64]) {
+    for (k, value) in out.iter_mut().enumerate() {
+        *value = row((offset + k) / 3)[(offset + k) % 3];
+    }
+}
+
+/// The same for node positions, a whole row at a time where `out` is aligned with them.
+fn gather(nodes: &[u32], x: &[Vec3], offset: usize, out: &mut [f64]) {
+    if offset % 3 != 0 || out.len() % 3 != 0 {
+        return rows(|k| x[nodes[k] as usize], offset, out);
+    }
+    for (row, &a) in out.chunks_exact_mut(3).zip(&nodes[offset / 3..]) {
+        row.copy_from_slice(x[a as usize].as_slice());
+    }
+}

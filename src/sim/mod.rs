@@ -1,0 +1,182 @@
+//! A simulation: what (the [`Model`]), where (the [`State`]), and the scratch of the solver.
+#![forbid(unsafe_code)]
+#![allow(non_snake_case)]
+
+mod access;
+mod model;
+mod ports;
+mod state;
+mod step;
+
+pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, Unconstrained, osteotomy_edges};
+pub use ports::Layout;
+pub use state::{State, StateError};
+pub use step::StepReport;
+
+use std::sync::Arc;
+
+use crate::solve::SolveError;
+
+/// Why a simulation refused a call. The state is still the last accepted one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// The solver gave up, also with the host step cut into small pieces.
+    #[error("step from t = {t} s by {dt} s: {source} (the load was cut down to 1/{cuts} of the step)")]
+    Solve {
+        /// Start of the step, s.
+        t: f64,
+        /// Length of the step, s.
+        dt: f64,
+        /// The smallest piece tried was one part in this many.
+        cuts: u32,
+        /// What the solver said.
+        source: SolveError,
+    },
+    /// The step length is no positive number.
+    #[error("a step must be a positive, finite number of seconds; found {0}")]
+    StepLength(f64),
+    /// An input is NaN or infinite.
+    #[error("input `{name}` is {value}; every input must be a finite number")]
+    NotFinite {
+        /// Port and element, 1-based: `bone.translation[2,1]`.
+        name: String,
+        /// What was found.
+        value: f64,
+    },
+    /// An input moves or pushes a bone that is not driven that way.
+    #[error(
+        "input `{name}` is {value}, but bone `{bone}` is {drive}: it takes no such input; change its `drive` in the scene"
+    )]
+    NotDriven {
+        /// Port and element, 1-based.
+        name: String,
+        /// What was found.
+        value: f64,
+        /// Name of the bone.
+        bone: String,
+        /// How it is driven.
+        drive: Drive,
+    },
+    /// No such port, or one of another type or causality.
+    #[error("port {port} of {n_ports} is not {wanted}")]
+    Port {
+        /// Index asked for.
+        port: usize,
+        /// Ports in the model.
+        n_ports: usize,
+        /// What was wanted of it.
+        wanted: &'static str,
+    },
+    /// A range of values outside a port.
+    #[error("`{name}` has {len} values; {offset} to {end} were asked for")]
+    Range {
+        /// Name of the port.
+        name: String,
+        /// Values it has.
+        len: usize,
+        /// First value asked for, 0-based.
+        offset: usize,
+        /// One past the last value asked for.
+        end: usize,
+    },
+    /// A state that belongs to another model.
+    #[error("the state belongs to another model: it has {found} nodes, this one {wanted}")]
+    ForeignState {
+        /// Nodes of the state.
+        found: usize,
+        /// Nodes of the model.
+        wanted: usize,
+    },
+    /// `[inertia] start = "rest"` with bones that do not start at rest.
+    #[error(
+        "the scene starts at rest, but bone `{0}` does not: give it a start pose of zero or start = \"equilibrium\""
+    )]
+    NotAtRest(String),
+}
+
+/// One simulation of a model.
+pub struct Sim {
+    model: Arc<Model>,
+    state: State,
+    work: step::Workspace,
+}
+
+impl Sim {
+    /// At rest, t = 0, inputs at their start values. Analyses the matrix; solves nothing.
+    ///
+    /// # Errors
+    /// None so far; the signature leaves room.
+    pub fn new(model: Arc<Model>) -> Result<Sim, SimError> {
+        let state = State::start(&model);
+        let work = step::Workspace::new(&model);
+        Ok(Sim { model, state, work })
+    }
+
+    /// The model it moves.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Simulation time, s.
+    pub fn time(&self) -> f64 {
+        self.state.t
+    }
+
+    /// Sets the start time (s), before `initialise`.
+    pub fn set_time(&mut self, t: f64) {
+        self.state.t = t;
+    }
+
+    /// Seeks the equilibrium at the start inputs; no time passes.
+    ///
+    /// # Errors
+    /// As for [`Sim::step`].
+    pub fn initialise(&mut self) -> Result<StepReport, SimError> {
+        step::initialise(&self.model, &mut self.state, &mut self.work)
+    }
+
+    /// Advances by `dt` seconds; all or nothing.
+    ///
+    /// A step does at most 64 load cuts of `solver.max_iterations` linear solves each.
+    ///
+    /// # Errors
+    /// [`SimError`]; the state is then the last accepted one, with the inputs as set.
+    pub fn step(&mut self, dt: f64) -> Result<StepReport, SimError> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(SimError::StepLength(dt));
+        }
+        step::advance(&self.model, &mut self.state, &mut self.work, dt)
+    }
+
+    /// A snapshot: time, positions, velocities, inputs, outputs and what the solver remembers.
+    pub fn save(&self) -> State {
+        self.state.clone()
+    }
+
+    /// Returns to a snapshot; outputs are back at once, and the next step gives the same bits as it did then.
+    ///
+    /// # Errors
+    /// [`SimError::ForeignState`].
+    pub fn restore(&mut self, state: &State) -> Result<(), SimError> {
+        if !state.fits(&self.model) {
+            return Err(SimError::ForeignState { found: state.config.x.len(), wanted: self.model.mesh().nodes.len() });
+        }
+        self.state.clone_from(state);
+        Ok(())
+    }
+
+    /// As after [`Sim::new`].
+    pub fn reset(&mut self) {
+        self.state = State::start(&self.model);
+    }
+
+    /// The solver's current positions, m, by node of the mesh.
+    pub fn positions(&self) -> &[crate::math::Vec3] {
+        &self.state.config.x
+    }
+
+    /// Stored entries of the stiffness matrix's factor (8 bytes each).
+    pub fn factor_len(&self) -> usize {
+        self.work.minimiser().factor_len()
+    }
+}

@@ -1,0 +1,300 @@
+//! The immutable model: mesh, bones, terms, ports. Shared by all simulations of it.
+
+use sha2::{Digest, Sha256};
+
+use super::ports::{Layout, table};
+use crate::fem::{Dofs, Term};
+use crate::math::{Mat3, Vec3, svd};
+use crate::mesh::{SKIN, TetMesh};
+use crate::port::Port;
+use crate::solve::Strategy;
+
+/// How a bone moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drive {
+    /// It stays at rest.
+    Held,
+    /// The host sets its pose.
+    Pose,
+    /// The host sets force and torque; the tissue holds it.
+    Force,
+    /// The host sets the displacement of every node.
+    Displacement,
+}
+
+impl std::fmt::Display for Drive {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Drive::Held => "held",
+            Drive::Pose => "pose-driven",
+            Drive::Force => "force-driven",
+            Drive::Displacement => "driven node by node",
+        })
+    }
+}
+
+/// A rigid (or nodally driven) bone and the tissue nodes that stick to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bone {
+    /// Name, unique among the bones.
+    pub name: String,
+    /// Attached nodes, ascending.
+    pub nodes: Vec<u32>,
+    /// How it moves.
+    pub drive: Drive,
+}
+
+/// A point that rides on a skin triangle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marker {
+    /// Name, unique among the markers.
+    pub name: String,
+    /// Nodes of the triangle.
+    pub nodes: [u32; 3],
+    /// Barycentric weights.
+    pub weights: [f64; 3],
+}
+
+/// Dynamics: nodal masses and how time starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inertia {
+    /// Mass of each node, kg.
+    pub m: Vec<f64>,
+    /// Whether time starts at rest rather than in equilibrium.
+    pub start_at_rest: bool,
+}
+
+/// Everything a model is made of.
+pub struct ModelParts {
+    /// Name of the scene.
+    pub name: String,
+    /// The tissue.
+    pub mesh: TetMesh,
+    /// Bones, in the order of the ports' rows; no node belongs to two.
+    pub bones: Vec<Bone>,
+    /// Names of the force loads, in order.
+    pub loads: Vec<String>,
+    /// Names of the pressure loads, in order.
+    pub pressures: Vec<String>,
+    /// Markers, in order.
+    pub markers: Vec<Marker>,
+    /// The summands of the energy.
+    pub terms: Vec<Box<dyn Term>>,
+    /// Dynamics, if the scene has it.
+    pub inertia: Option<Inertia>,
+    /// Where the inputs lie.
+    pub layout: Layout,
+    /// Start values of all inputs.
+    pub start: Vec<f64>,
+    /// How the minimum is sought.
+    pub strategy: Strategy,
+    /// Text that, with the mesh and the ports, identifies the model (the scene).
+    pub identity: String,
+    /// What the user should know about the model.
+    pub warnings: Vec<String>,
+}
+
+/// Tissue that nothing holds.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "{count} piece(s) of tissue are held by no bone, so a quasi-static scene has no answer; the largest has {nodes} nodes \
+     around ({x:.4}, {y:.4}, {z:.4}) m and {held} held nodes (at least 3 that are not in a line are needed): attach a \
+     bone there, drop the piece from the mesh, or add [inertia]"
+)]
+pub struct Unconstrained {
+    /// Loose pieces.
+    pub count: usize,
+    /// Nodes of the largest.
+    pub nodes: usize,
+    /// Held nodes in it.
+    pub held: usize,
+    /// Its centroid, m.
+    pub x: f64,
+    /// Its centroid, m.
+    pub y: f64,
+    /// Its centroid, m.
+    pub z: f64,
+}
+
+/// What is simulated; immutable, shared, `Send + Sync`.
+pub struct Model {
+    parts: ModelParts,
+    ports: Vec<Port>,
+    dofs: Dofs,
+    skin: Vec<u32>,
+    triangles: Vec<i32>,
+    osteotomy: Vec<(u32, u32)>,
+    token: String,
+}
+
+impl Model {
+    /// Finishes a model: splits the unknowns, lists the ports, checks that the tissue is held.
+    ///
+    /// # Errors
+    /// [`Unconstrained`] for a quasi-static scene with loose tissue.
+    pub fn new(mut parts: ModelParts) -> Result<Model, Unconstrained> {
+        let mut prescribed: Vec<u32> =
+            parts.bones.iter().filter(|b| b.drive != Drive::Force).flat_map(|b| b.nodes.iter().copied()).collect();
+        prescribed.sort_unstable();
+        let rigid = parts.bones.iter().enumerate().filter(|(_, b)| b.drive == Drive::Force);
+        let rigid = rigid.map(|(k, b)| (k, b.nodes.clone())).collect();
+        let dofs = Dofs::new(parts.mesh.nodes.len(), prescribed, rigid);
+        if parts.inertia.is_none() {
+            check_held(&parts, &dofs)?;
+        }
+        let skin = parts.mesh.skin_nodes();
+        let row = |a: &u32| skin.binary_search(a).expect("skin nodes come from the triangles") as i32;
+        let triangles: Vec<i32> =
+            parts.mesh.face_set(SKIN).map_or(Vec::new(), |s| s.triangles.as_flattened().iter().map(row).collect());
+        let ports = table(&parts, skin.len(), triangles.len() / 3);
+        let osteotomy = osteotomy_edges(&parts.mesh, &parts.bones);
+        if !osteotomy.is_empty() {
+            parts.warnings.push(format!(
+                "{} edge(s) join nodes of two bones; if the bones move apart the answer depends on the mesh: release \
+                 them with [attachment] free_rings = 1",
+                osteotomy.len()
+            ));
+        }
+        let token = token(&parts, &ports);
+        Ok(Model { parts, ports, dofs, skin, triangles, osteotomy, token })
+    }
+
+    /// Name of the scene.
+    pub fn name(&self) -> &str {
+        &self.parts.name
+    }
+    /// What it is made of.
+    pub fn parts(&self) -> &ModelParts {
+        &self.parts
+    }
+    /// The tissue.
+    pub fn mesh(&self) -> &TetMesh {
+        &self.parts.mesh
+    }
+    /// The interface, ascending by value reference.
+    pub fn ports(&self) -> &[Port] {
+        &self.ports
+    }
+    /// What is unknown.
+    pub fn dofs(&self) -> &Dofs {
+        &self.dofs
+    }
+    /// Mesh nodes of the skin, in the order of `skin.position`.
+    pub fn skin(&self) -> &[u32] {
+        &self.skin
+    }
+    /// Skin triangles as rows of `skin.position`, flattened.
+    pub fn skin_triangles(&self) -> &[i32] {
+        &self.triangles
+    }
+    /// Edges between nodes of two bones.
+    pub(super) fn osteotomy(&self) -> &[(u32, u32)] {
+        &self.osteotomy
+    }
+    /// Hash of ports, mesh and scene in braces: FMI's instantiation token.
+    pub fn token(&self) -> &str {
+        &self.token
+    }
+    /// What the user should know about the model.
+    pub fn warnings(&self) -> &[String] {
+        &self.parts.warnings
+    }
+}
+
+/// Mesh edges whose ends belong to two bones: across them a bone motion is a jump within one element.
+pub fn osteotomy_edges(mesh: &TetMesh, bones: &[Bone]) -> Vec<(u32, u32)> {
+    let mut owner = vec![u32::MAX; mesh.nodes.len()];
+    for (b, bone) in bones.iter().enumerate() {
+        bone.nodes.iter().for_each(|&a| owner[a as usize] = b as u32);
+    }
+    let mut edges: Vec<(u32, u32)> = mesh
+        .tets
+        .iter()
+        .flat_map(|t| [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)].map(|(i, j)| (t[i].min(t[j]), t[i].max(t[j]))))
+        .filter(|&(a, b)| {
+            let (p, q) = (owner[a as usize], owner[b as usize]);
+            p != q && p != u32::MAX && q != u32::MAX
+        })
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+/// Every connected piece of tissue must have three held nodes that are not in a line.
+fn check_held(parts: &ModelParts, dofs: &Dofs) -> Result<(), Unconstrained> {
+    let n = parts.mesh.nodes.len();
+    let mut piece = DisjointSets::new(n);
+    for tet in &parts.mesh.tets {
+        tet.iter().for_each(|&a| piece.join(tet[0], a));
+    }
+    for body in &dofs.bodies {
+        body.nodes.iter().for_each(|&a| piece.join(body.nodes[0], a));
+    }
+    let roots: Vec<u32> = (0..n as u32).map(|a| piece.root(a)).collect();
+    let mut held: std::collections::BTreeMap<u32, Vec<Vec3>> = Default::default();
+    let mut size: std::collections::BTreeMap<u32, (usize, Vec3)> = Default::default();
+    for (a, &root) in roots.iter().enumerate() {
+        let entry = size.entry(root).or_insert((0, Vec3::zeros()));
+        entry.0 += 1;
+        entry.1 += parts.mesh.nodes[a];
+    }
+    for &a in &dofs.prescribed {
+        held.entry(roots[a as usize]).or_default().push(parts.mesh.nodes[a as usize]);
+    }
+    let loose: Vec<_> = size.iter().filter(|(root, _)| !spans_a_plane(held.get(root))).collect();
+    let Some((root, (nodes, sum))) = loose.iter().max_by_key(|(_, (nodes, _))| *nodes) else {
+        return Ok(());
+    };
+    let c = sum / *nodes as f64;
+    let held = held.get(root).map_or(0, Vec::len);
+    Err(Unconstrained { count: loose.len(), nodes: *nodes, held, x: c.x, y: c.y, z: c.z })
+}
+
+fn spans_a_plane(points: Option<&Vec<Vec3>>) -> bool {
+    let Some(points) = points else { return false };
+    let c = points.iter().sum::<Vec3>() / points.len() as f64;
+    let spread: Mat3 = points.iter().map(|p| (p - c) * (p - c).transpose()).sum();
+    let s = svd(&spread).s;
+    s[1] > 1e-12 * s[0] && s[0] > 0.0
+}
+
+struct DisjointSets(Vec<u32>);
+
+impl DisjointSets {
+    fn new(n: usize) -> Self {
+        DisjointSets((0..n as u32).collect())
+    }
+    fn root(&mut self, mut a: u32) -> u32 {
+        while self.0[a as usize] != a {
+            self.0[a as usize] = self.0[self.0[a as usize] as usize];
+            a = self.0[a as usize];
+        }
+        a
+    }
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+}
+
+fn token(parts: &ModelParts, ports: &[Port]) -> String {
+    let mut hash = Sha256::new();
+    hash.update(env!("CARGO_PKG_VERSION"));
+    hash.update(&parts.identity);
+    for p in ports {
+        hash.update(format!(
+            "{} {} {:?} {:?} {} {:?} {:?}",
+            p.name, p.reference, p.ty, p.shape, p.unit, p.causality, p.start
+        ));
+    }
+    let mesh = &parts.mesh;
+    mesh.nodes.iter().flat_map(|x| x.iter()).for_each(|c| hash.update(c.to_le_bytes()));
+    mesh.tets.as_flattened().iter().chain(&mesh.region).for_each(|i| hash.update(i.to_le_bytes()));
+    for bone in &parts.bones {
+        bone.nodes.iter().for_each(|a| hash.update(a.to_le_bytes()));
+    }
+    let digest = hash.finalize();
+    let hex: String = digest.iter().take(16).map(|b| format!("{b:02x}")).collect();
+    format!("{{{}-{}-{}-{}-{}}}", &hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..])
+}

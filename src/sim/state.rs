@@ -1,0 +1,275 @@
+//! What evolves: cloned for a snapshot, serialized for another process.
+
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+
+use super::model::Model;
+use crate::bytes::{Reader, Truncated, Writer};
+use crate::fem::Configuration;
+use crate::math::{Mat3, Pose, Vec3};
+
+/// Where and how the kept stiffness was factored. Part of the state, so that a restored simulation repeats its bits.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Linearisation {
+    pub config: Configuration,
+    pub t: f64,
+    pub dt: f64,
+    pub inputs: Vec<f64>,
+}
+
+/// What the last step left for the host to read.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Outputs {
+    pub reaction_force: Vec<Vec3>,
+    pub reaction_torque: Vec<Vec3>,
+    pub iterations: u32,
+    pub residual: f64,
+    pub converged: bool,
+    pub elastic: f64,
+    pub kinetic: f64,
+    pub min_det_f: f64,
+    pub max_stretch: f64,
+}
+
+/// A snapshot of a simulation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    pub(super) t: f64,
+    pub(super) config: Configuration,
+    /// Nodal velocities, m/s; empty in quasi-static scenes.
+    pub(super) v: Vec<Vec3>,
+    /// Inputs as the host set them last.
+    pub(super) inputs: Vec<f64>,
+    /// Inputs of the last accepted step: where the next one starts from.
+    pub(super) applied: Vec<f64>,
+    pub(super) linearisation: Option<Arc<Linearisation>>,
+    pub(super) outputs: Outputs,
+}
+
+/// Why bytes are no state of this model.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StateError {
+    /// The first bytes are not those of a state.
+    #[error("these bytes are no saved cutis state (they begin with {0:02x?})")]
+    Magic(Vec<u8>),
+    /// A format this version cannot read.
+    #[error("the saved state has format {found}; this version reads format {wanted}")]
+    Format {
+        /// Found.
+        found: u32,
+        /// Readable.
+        wanted: u32,
+    },
+    /// It was saved by another model.
+    #[error("the saved state belongs to model {found}; this model is {wanted}")]
+    Model {
+        /// Token found.
+        found: String,
+        /// Token of this model.
+        wanted: String,
+    },
+    /// The checksum does not match.
+    #[error("the saved state is damaged: its checksum does not match its content")]
+    Checksum,
+    /// It ends too early.
+    #[error("the saved state is cut short: {0}")]
+    Truncated(#[from] Truncated),
+    /// A list has the wrong length.
+    #[error("the saved state holds {found} {what}; the model has {wanted}")]
+    Length {
+        /// What is counted.
+        what: &'static str,
+        /// Found.
+        found: usize,
+        /// Wanted.
+        wanted: usize,
+    },
+}
+
+const MAGIC: &[u8; 8] = b"cutis-st";
+const FORMAT: u32 = 1;
+
+impl State {
+    /// At rest, t = 0, inputs at their start values.
+    pub(super) fn start(model: &Model) -> State {
+        let parts = model.parts();
+        let n = parts.bones.len();
+        State {
+            t: 0.0,
+            config: Configuration { x: parts.mesh.nodes.clone(), poses: vec![Pose::REST; n] },
+            v: if parts.inertia.is_some() { vec![Vec3::zeros(); parts.mesh.nodes.len()] } else { Vec::new() },
+            inputs: parts.start.clone(),
+            applied: rest_inputs(model),
+            linearisation: None,
+            outputs: Outputs {
+                reaction_force: vec![Vec3::zeros(); n],
+                reaction_torque: vec![Vec3::zeros(); n],
+                iterations: 0,
+                residual: 0.0,
+                converged: false,
+                elastic: 0.0,
+                kinetic: 0.0,
+                min_det_f: 1.0,
+                max_stretch: 1.0,
+            },
+        }
+    }
+
+    /// Whether its lists have the lengths of the model.
+    pub(super) fn fits(&self, model: &Model) -> bool {
+        let parts = model.parts();
+        self.config.x.len() == parts.mesh.nodes.len()
+            && self.config.poses.len() == parts.bones.len()
+            && self.inputs.len() == parts.layout.len()
+            && self.v.is_empty() == parts.inertia.is_none()
+    }
+
+    /// Versioned, checksummed little-endian bytes; readable in another process with the same model.
+    pub fn to_bytes(&self, model: &Model) -> Vec<u8> {
+        let mut body = Writer::default();
+        body.text(model.token());
+        body.f64(self.t);
+        put_config(&mut body, &self.config);
+        put_vectors(&mut body, &self.v);
+        body.f64s(self.inputs.iter().copied());
+        body.f64s(self.applied.iter().copied());
+        let o = &self.outputs;
+        put_vectors(&mut body, &o.reaction_force);
+        put_vectors(&mut body, &o.reaction_torque);
+        body.u32(o.iterations);
+        body.u32(u32::from(o.converged));
+        body.f64s([o.residual, o.elastic, o.kinetic, o.min_det_f, o.max_stretch].into_iter());
+        body.u32(u32::from(self.linearisation.is_some()));
+        if let Some(l) = &self.linearisation {
+            put_config(&mut body, &l.config);
+            body.f64(l.t);
+            body.f64(l.dt);
+            body.f64s(l.inputs.iter().copied());
+        }
+        let mut out = Writer::default();
+        out.raw(MAGIC);
+        out.u32(FORMAT);
+        out.raw(&Sha256::digest(&body.0));
+        out.raw(&body.0);
+        out.0
+    }
+
+    /// The state that [`State::to_bytes`] wrote.
+    ///
+    /// # Errors
+    /// [`StateError`], for foreign, damaged or cut bytes.
+    pub fn from_bytes(bytes: &[u8], model: &Model) -> Result<State, StateError> {
+        let mut head = Reader::new(bytes);
+        let magic = head.raw(8.min(bytes.len()))?;
+        if magic != MAGIC {
+            return Err(StateError::Magic(magic.to_vec()));
+        }
+        let found = head.u32()?;
+        if found != FORMAT {
+            return Err(StateError::Format { found, wanted: FORMAT });
+        }
+        let checksum = head.raw(32)?;
+        let body = head.raw(head.left())?;
+        if Sha256::digest(body).as_slice() != checksum {
+            return Err(StateError::Checksum);
+        }
+        let mut r = Reader::new(body);
+        let token = r.text()?;
+        if token != model.token() {
+            return Err(StateError::Model { found: token, wanted: model.token().into() });
+        }
+        let parts = model.parts();
+        let (n, n_bones) = (parts.mesh.nodes.len(), parts.bones.len());
+        let n_inputs = parts.layout.len();
+        let t = r.f64()?;
+        let config = take_config(&mut r, n, n_bones)?;
+        let v = take_vectors(&mut r, "velocities", if parts.inertia.is_some() { n } else { 0 })?;
+        let inputs = take_f64s(&mut r, "inputs", n_inputs)?;
+        let applied = take_f64s(&mut r, "inputs", n_inputs)?;
+        let reaction_force = take_vectors(&mut r, "reactions", n_bones)?;
+        let reaction_torque = take_vectors(&mut r, "reactions", n_bones)?;
+        let (iterations, converged) = (r.u32()?, r.u32()? != 0);
+        let scalars = take_f64s(&mut r, "diagnostics", 5)?;
+        let linearisation = match r.u32()? {
+            0 => None,
+            _ => Some(Arc::new(Linearisation {
+                config: take_config(&mut r, n, n_bones)?,
+                t: r.f64()?,
+                dt: r.f64()?,
+                inputs: take_f64s(&mut r, "inputs", n_inputs)?,
+            })),
+        };
+        let [residual, elastic, kinetic, min_det_f, max_stretch] = scalars[..] else {
+            return Err(StateError::Length { what: "diagnostics", found: scalars.len(), wanted: 5 });
+        };
+        let outputs = Outputs {
+            reaction_force,
+            reaction_torque,
+            iterations,
+            residual,
+            converged,
+            elastic,
+            kinetic,
+            min_det_f,
+            max_stretch,
+        };
+        Ok(State { t, config, v, inputs, applied, linearisation, outputs })
+    }
+}
+
+/// The inputs under which the rest state is in equilibrium: no motion, no load; parameters as they start.
+fn rest_inputs(model: &Model) -> Vec<f64> {
+    let parts = model.parts();
+    let mut rest = vec![0.0; parts.layout.len()];
+    if let Some(first) = parts.layout.first(crate::port::Slot::BonePivot) {
+        let end = first + 3 * parts.bones.len();
+        rest[first..end].copy_from_slice(&parts.start[first..end]);
+    }
+    rest
+}
+
+fn put_vectors(w: &mut Writer, vectors: &[Vec3]) {
+    w.len(vectors.len());
+    vectors.iter().flat_map(|v| v.iter()).for_each(|c| w.f64(*c));
+}
+
+fn put_config(w: &mut Writer, config: &Configuration) {
+    put_vectors(w, &config.x);
+    w.len(config.poses.len());
+    for pose in &config.poses {
+        pose.t.iter().chain(pose.R.iter()).for_each(|c| w.f64(*c));
+    }
+}
+
+fn expect_len(what: &'static str, found: usize, wanted: usize) -> Result<(), StateError> {
+    if found == wanted { Ok(()) } else { Err(StateError::Length { what, found, wanted }) }
+}
+
+fn take_vectors(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec<Vec3>, StateError> {
+    let n = r.len(24)?;
+    expect_len(what, n, wanted)?;
+    (0..n).map(|_| Ok(Vec3::new(r.f64()?, r.f64()?, r.f64()?))).collect()
+}
+
+fn take_f64s(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec<f64>, StateError> {
+    let values = r.f64s()?;
+    expect_len(what, values.len(), wanted)?;
+    Ok(values)
+}
+
+fn take_config(r: &mut Reader, n: usize, n_bones: usize) -> Result<Configuration, StateError> {
+    let x = take_vectors(r, "nodes", n)?;
+    let found = r.len(96)?;
+    expect_len("bones", found, n_bones)?;
+    let mut poses = Vec::with_capacity(found);
+    for _ in 0..found {
+        let t = Vec3::new(r.f64()?, r.f64()?, r.f64()?);
+        let mut R = Mat3::zeros();
+        for c in R.iter_mut() {
+            *c = r.f64()?;
+        }
+        poses.push(Pose { t, R });
+    }
+    Ok(Configuration { x, poses })
+}

@@ -1,0 +1,432 @@
+//! One host step: targets, prediction, minimisation, acceptance. All or nothing.
+//!
+//! Quasi-static equilibrium and backward Euler are one minimisation (see `effect::inertia`); a step that fails is cut
+//! into smaller pieces of load and time.
+
+use std::sync::Arc;
+
+use super::model::{Drive, Model};
+use super::state::{Linearisation, State};
+use super::{SimError, SolveError};
+use crate::fem::{At, Configuration, Strain};
+use crate::math::{Mat3, Pose, Vec3, best_fit};
+use crate::port::Slot;
+use crate::solve::{Minimiser, Outcome, Problem};
+
+/// A step is cut into pieces no smaller than this part of it.
+const SMALLEST_PIECE: f64 = 1.0 / 64.0;
+/// After a piece that succeeded the next one may be this much larger.
+const GROWTH: f64 = 2.0;
+/// Change of ln dt beyond which the stiffness with inertia is factored anew.
+const DT_DRIFT: f64 = 0.1;
+/// A jump across a bone-to-bone edge larger than this part of its length is reported.
+const LARGEST_JUMP: f64 = 0.3;
+/// The bones' common rigid motion is taken out first where it explains all but this part of their motion.
+const RIGID_REMAINDER: f64 = 0.5;
+/// Turns smaller than this (rad, squared) leave the factor as it is.
+const FRAME_THRESHOLD: f64 = 0.05 * 0.05;
+
+/// What a step did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepReport {
+    /// Linear solves.
+    pub iterations: u32,
+    /// Factorisations.
+    pub factorisations: u32,
+    /// Pieces the step was cut into; 1 if it went in one.
+    pub substeps: u32,
+    /// Norm of the force residual, N.
+    pub residual: f64,
+    /// Largest nodal motion of the last correction, m.
+    pub correction: f64,
+    /// Whether the tolerance was met.
+    pub converged: bool,
+    /// Smallest det F.
+    pub min_det_f: f64,
+    /// Largest principal stretch.
+    pub max_stretch: f64,
+    /// Strain energy, J.
+    pub elastic: f64,
+    /// What the user should know about this step; empty as a rule.
+    pub warnings: Vec<String>,
+}
+
+/// Scratch of the solver; never saved. Allocates when made, then no more.
+pub(super) struct Workspace {
+    minimiser: Minimiser,
+    /// Which linearisation the minimiser's factor was made from.
+    factored: Option<Arc<Linearisation>>,
+    config: Configuration,
+    v: Vec<Vec3>,
+    inputs: Vec<f64>,
+    x_tilde: Vec<Vec3>,
+    pivots: Vec<Vec3>,
+    u: Vec<Vec3>,
+    wrenches: Vec<(Vec3, Vec3)>,
+}
+
+impl Workspace {
+    pub fn new(model: &Model) -> Workspace {
+        let parts = model.parts();
+        let X = &parts.mesh.nodes;
+        let pivots = vec![Vec3::zeros(); parts.bones.len()];
+        let wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
+        let problem = Problem {
+            terms: &parts.terms,
+            dofs: model.dofs(),
+            X,
+            pivots: &pivots,
+            wrenches: &wrenches,
+            at: At { t: 0.0, dt: 0.0, inputs: &parts.start, x_tilde: X, x_lag: X },
+        };
+        Workspace {
+            minimiser: Minimiser::new(&problem, parts.strategy),
+            factored: None,
+            config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
+            v: vec![Vec3::zeros(); if parts.inertia.is_some() { X.len() } else { 0 }],
+            inputs: parts.start.clone(),
+            x_tilde: if parts.inertia.is_some() { X.clone() } else { Vec::new() },
+            u: vec![Vec3::zeros(); model.dofs().prescribed.len()],
+            pivots,
+            wrenches,
+        }
+    }
+
+    pub fn minimiser(&self) -> &Minimiser {
+        &self.minimiser
+    }
+}
+
+/// Seeks the equilibrium at the start inputs, or checks that rest is where the scene starts.
+pub(super) fn initialise(model: &Model, state: &mut State, work: &mut Workspace) -> Result<StepReport, SimError> {
+    if model.parts().inertia.as_ref().is_some_and(|i| i.start_at_rest) {
+        check_inputs(model, &state.inputs)?;
+        read_pivots(model, &state.inputs, &mut work.pivots);
+        work.inputs.copy_from_slice(&state.inputs);
+        place_bones(model, &work.inputs, &mut work.config);
+        if let Some(bone) = (0..model.parts().bones.len()).find(|&b| work.config.poses[b] != Pose::REST) {
+            return Err(SimError::NotAtRest(model.parts().bones[bone].name.clone()));
+        }
+        state.applied.copy_from_slice(&state.inputs);
+        state.outputs.converged = true;
+        return Ok(StepReport::new(0));
+    }
+    let mut report = advance(model, state, work, 0.0)?;
+    // Nothing has moved yet: the way to the start equilibrium is no velocity.
+    state.v.fill(Vec3::zeros());
+    report.substeps = report.substeps.max(1);
+    Ok(report)
+}
+
+/// Moves `state` on by `dt` seconds, or leaves it as it is.
+pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> Result<StepReport, SimError> {
+    check_inputs(model, &state.inputs)?;
+    read_pivots(model, &state.inputs, &mut work.pivots);
+    work.config.copy_from(&state.config);
+    work.v.copy_from_slice(&state.v);
+    let mut report = StepReport::new(0);
+    let mut linearisation = state.linearisation.clone();
+    let (mut done, mut piece) = (0.0, 1.0);
+    while done < 1.0 {
+        let to: f64 = if done + piece >= 1.0 { 1.0 } else { done + piece };
+        for ((now, from), last) in work.inputs.iter_mut().zip(&state.applied).zip(&state.inputs) {
+            *now = if to == 1.0 { *last } else { from + to * (last - from) };
+        }
+        read_wrenches(model, &work.inputs, &mut work.wrenches);
+        // The piece starts from what the pieces before it left in `work`; a failed one is undone below.
+        let before = (work.config.clone(), linearisation.clone());
+        let t = state.t + to * dt;
+        match step_piece(model, work, &mut linearisation, t, dt * (to - done), &mut report) {
+            Ok(()) => {
+                report.substeps += 1;
+                done = to;
+                piece *= GROWTH;
+            }
+            Err(source) => {
+                (work.config, linearisation) = before;
+                piece *= 0.5;
+                if piece < SMALLEST_PIECE {
+                    return Err(SimError::Solve { t: state.t, dt, cuts: (1.0 / SMALLEST_PIECE) as u32, source });
+                }
+            }
+        }
+    }
+    let strain = strain_of(model, &work.config.x);
+    warn_of_jumps(model, &state.config, &work.config, &mut report);
+    state.t += dt;
+    state.config.copy_from(&work.config);
+    state.v.copy_from_slice(&work.v);
+    state.applied.copy_from_slice(&work.inputs);
+    state.linearisation = linearisation;
+    report.min_det_f = strain.min_det_f;
+    report.max_stretch = strain.max_stretch;
+    report.elastic = strain.energy;
+    report.converged = true;
+    read_outputs(model, state, work, &report);
+    Ok(report)
+}
+
+impl StepReport {
+    fn new(substeps: u32) -> StepReport {
+        StepReport {
+            iterations: 0,
+            factorisations: 0,
+            substeps,
+            residual: 0.0,
+            correction: 0.0,
+            converged: true,
+            min_det_f: 1.0,
+            max_stretch: 1.0,
+            elastic: 0.0,
+            warnings: Vec::new(),
+        }
+    }
+
+    fn count(&mut self, outcome: &Outcome) {
+        self.iterations += outcome.iterations;
+        self.factorisations += outcome.factorisations;
+        self.residual = outcome.residual;
+        self.correction = outcome.correction;
+    }
+}
+
+/// One piece of a step, from and into `work`.
+fn step_piece(
+    model: &Model,
+    work: &mut Workspace,
+    linearisation: &mut Option<Arc<Linearisation>>,
+    t: f64,
+    dt: f64,
+    report: &mut StepReport,
+) -> Result<(), SolveError> {
+    let parts = model.parts();
+    let dofs = model.dofs();
+    let Workspace { minimiser, factored, config, v, inputs, x_tilde, pivots, u, wrenches } = work;
+    for ((y, x), v) in x_tilde.iter_mut().zip(&config.x).zip(&*v) {
+        *y = x + dt * v;
+    }
+    let at = At { t, dt, inputs, x_tilde, x_lag: &[] };
+    let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
+    let inverted_before = strain_of(model, &config.x).min_det_f <= 0.0;
+    let start = if parts.inertia.is_some() { config.x.clone() } else { Vec::new() };
+
+    restore_factor(model, &problem, minimiser, factored, linearisation, config, report)?;
+    place_bones(model, inputs, config);
+    target_increments(model, inputs, pivots, config, u);
+    if !problem.is_quadratic() {
+        if dt == 0.0 || parts.inertia.is_none() {
+            move_along(dofs.prescribed.as_slice(), config, u);
+        }
+        minimiser.set_frame(frame(factored.as_deref(), config));
+    }
+    minimiser.predict(&problem, config, u);
+    report.iterations += 1;
+    let outcome = minimiser.minimise(&problem, config)?;
+    report.count(&outcome);
+    if !problem.is_quadratic() && !inverted_before && strain_of(model, &config.x).min_det_f <= 0.0 {
+        return Err(SolveError::NotFinite("the step would turn elements inside out"));
+    }
+    if outcome.factorisations > 0 {
+        let made = Linearisation { config: minimiser.factored_at().clone(), t, dt, inputs: inputs.clone() };
+        let made = Arc::new(made);
+        *factored = Some(made.clone());
+        *linearisation = Some(made);
+    }
+    if parts.inertia.is_some() && dt > 0.0 {
+        for ((v, x), x0) in v.iter_mut().zip(&config.x).zip(&start) {
+            *v = (x - x0) / dt;
+        }
+    }
+    Ok(())
+}
+
+/// Makes the minimiser's factor the one the state remembers, or a new one at `config` if there is none that serves.
+fn restore_factor(
+    model: &Model,
+    problem: &Problem,
+    minimiser: &mut Minimiser,
+    factored: &mut Option<Arc<Linearisation>>,
+    linearisation: &mut Option<Arc<Linearisation>>,
+    config: &Configuration,
+    report: &mut StepReport,
+) -> Result<(), SolveError> {
+    let dt = problem.at.dt;
+    let serves = |l: &Linearisation| {
+        model.parts().inertia.is_none()
+            || (l.dt == 0.0) == (dt == 0.0) && (dt == 0.0 || (l.dt / dt).ln().abs() <= DT_DRIFT)
+    };
+    if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
+        let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
+        if !(same && minimiser.is_factored()) {
+            let at = At { t: wanted.t, dt: wanted.dt, inputs: &wanted.inputs, ..problem.at };
+            *factored = None;
+            minimiser.linearise(&Problem { at, ..*problem }, &wanted.config)?;
+            *factored = Some(wanted.clone());
+        }
+        return Ok(());
+    }
+    *factored = None;
+    minimiser.linearise(problem, config)?;
+    report.factorisations += 1;
+    let made =
+        Arc::new(Linearisation { config: config.clone(), t: problem.at.t, dt, inputs: problem.at.inputs.to_vec() });
+    *factored = Some(made.clone());
+    *linearisation = Some(made);
+    Ok(())
+}
+
+/// Rotation of the tissue since the factor was made.
+fn frame(factored: Option<&Linearisation>, config: &Configuration) -> Mat3 {
+    let Some(l) = factored else {
+        return Mat3::identity();
+    };
+    let (R, ..) = best_fit(l.config.x.iter().copied(), config.x.iter().copied());
+    // |R - I|^2 = 2 angle^2 for small angles.
+    if (R - Mat3::identity()).norm_squared() < 2.0 * FRAME_THRESHOLD { Mat3::identity() } else { R }
+}
+
+/// Moves everything along with the bones where they move as one; `u` keeps what is left of their motion.
+fn move_along(prescribed: &[u32], config: &mut Configuration, u: &mut [Vec3]) {
+    let from = prescribed.iter().map(|&a| config.x[a as usize]);
+    let to = prescribed.iter().zip(&*u).map(|(&a, u)| config.x[a as usize] + u);
+    let (R, a, c) = best_fit(from.clone(), to.clone());
+    let moved = |x: Vec3| c + R * (x - a);
+    let left: f64 = from.zip(to).map(|(x, y)| (y - moved(x)).norm_squared()).sum();
+    let all: f64 = u.iter().map(|u| u.norm_squared()).sum();
+    if all == 0.0 || left > RIGID_REMAINDER * RIGID_REMAINDER * all {
+        return;
+    }
+    for (u, &p) in u.iter_mut().zip(prescribed) {
+        let x = config.x[p as usize];
+        *u = x + *u - moved(x);
+    }
+    for x in &mut config.x {
+        *x = moved(*x);
+    }
+}
+
+fn strain_of(model: &Model, x: &[Vec3]) -> Strain {
+    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(x)))
+}
+
+fn input3(inputs: &[f64], first: Option<usize>, row: usize) -> Vec3 {
+    first.map_or(Vec3::zeros(), |f| Vec3::from_column_slice(&inputs[f + 3 * row..f + 3 * row + 3]))
+}
+
+fn read_pivots(model: &Model, inputs: &[f64], pivots: &mut [Vec3]) {
+    let first = model.parts().layout.first(Slot::BonePivot);
+    for (b, pivot) in pivots.iter_mut().enumerate() {
+        *pivot = input3(inputs, first, b);
+    }
+}
+
+fn read_wrenches(model: &Model, inputs: &[f64], wrenches: &mut [(Vec3, Vec3)]) {
+    let layout = &model.parts().layout;
+    let (force, torque) = (layout.first(Slot::BoneForce), layout.first(Slot::BoneTorque));
+    for (body, wrench) in model.dofs().bodies.iter().zip(wrenches) {
+        *wrench = (input3(inputs, force, body.bone), input3(inputs, torque, body.bone));
+    }
+}
+
+/// Writes the poses that the inputs ask for; nodes stay where they are.
+fn place_bones(model: &Model, inputs: &[f64], config: &mut Configuration) {
+    let layout = &model.parts().layout;
+    let (translation, rotation) = (layout.first(Slot::BoneTranslation), layout.first(Slot::BoneRotation));
+    for (b, bone) in model.parts().bones.iter().enumerate() {
+        if bone.drive == Drive::Pose {
+            config.poses[b] = Pose::new(input3(inputs, translation, b), &input3(inputs, rotation, b));
+        }
+    }
+}
+
+/// `u`: how far each prescribed node has to go.
+fn target_increments(model: &Model, inputs: &[f64], pivots: &[Vec3], config: &Configuration, u: &mut [Vec3]) {
+    let parts = model.parts();
+    for (b, bone) in parts.bones.iter().enumerate() {
+        let displacement = parts.layout.first(Slot::BoneNodal(b as u32));
+        for (k, &a) in bone.nodes.iter().enumerate() {
+            let crate::fem::Role::Prescribed(p) = model.dofs().role[a as usize] else {
+                continue;
+            };
+            let X = &parts.mesh.nodes[a as usize];
+            let target = match bone.drive {
+                Drive::Displacement => X + input3(inputs, displacement, k),
+                _ => config.poses[b].place(&pivots[b], X),
+            };
+            u[p as usize] = target - config.x[a as usize];
+        }
+    }
+}
+
+/// Every input must be finite, and none may ask a bone for what its drive does not do.
+fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
+    if let Some((k, value)) = inputs.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+        return Err(SimError::NotFinite { name: model.input_name(k), value: *value });
+    }
+    let parts = model.parts();
+    for (slots, drive) in [
+        ([Slot::BoneTranslation, Slot::BoneRotation], Drive::Pose),
+        ([Slot::BoneForce, Slot::BoneTorque], Drive::Force),
+    ] {
+        for first in slots.iter().filter_map(|s| parts.layout.first(*s)) {
+            for (b, bone) in parts.bones.iter().enumerate().filter(|(_, bone)| bone.drive != drive) {
+                if let Some(k) = (first + 3 * b..first + 3 * b + 3).find(|&k| inputs[k] != 0.0) {
+                    return Err(SimError::NotDriven {
+                        name: model.input_name(k),
+                        value: inputs[k],
+                        bone: bone.name.clone(),
+                        drive: bone.drive,
+                    });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Tells of bones that moved apart across a single element.
+fn warn_of_jumps(model: &Model, before: &Configuration, after: &Configuration, report: &mut StepReport) {
+    let X = &model.mesh().nodes;
+    let jump = |x: &Configuration, a: u32, b: u32| {
+        let (a, b) = (a as usize, b as usize);
+        ((x.x[a] - X[a]) - (x.x[b] - X[b])).norm() / (X[a] - X[b]).norm()
+    };
+    let worst = model.osteotomy().iter().map(|&(a, b)| (jump(after, a, b), a, b)).max_by(|p, q| p.0.total_cmp(&q.0));
+    let Some((ratio, a, b)) = worst else { return };
+    if ratio > LARGEST_JUMP && jump(before, a, b) <= LARGEST_JUMP {
+        let x = X[a as usize];
+        report.warnings.push(format!(
+            "bones move apart by {ratio:.2} of the edge between nodes {a} and {b} at ({:.4}, {:.4}, {:.4}) m: forces and \
+             the skin there depend on the mesh; release the line with [attachment] free_rings = 1",
+            x.x, x.y, x.z
+        ));
+    }
+}
+
+/// Reactions, energies and diagnostics of the accepted step.
+fn read_outputs(model: &Model, state: &mut State, work: &Workspace, report: &StepReport) {
+    let parts = model.parts();
+    let g = work.minimiser.nodal_gradient();
+    let o = &mut state.outputs;
+    for (b, bone) in parts.bones.iter().enumerate() {
+        let pivot = work.pivots[b] + state.config.poses[b].t;
+        let (mut force, mut torque) = (Vec3::zeros(), Vec3::zeros());
+        for &a in &bone.nodes {
+            let f = -g[a as usize];
+            force += f;
+            torque += (state.config.x[a as usize] - pivot).cross(&f);
+        }
+        o.reaction_force[b] = force;
+        o.reaction_torque[b] = torque;
+    }
+    o.iterations = report.iterations;
+    o.residual = report.residual;
+    o.converged = report.converged;
+    o.elastic = report.elastic;
+    o.min_det_f = report.min_det_f;
+    o.max_stretch = report.max_stretch;
+    o.kinetic = parts
+        .inertia
+        .as_ref()
+        .map_or(0.0, |inertia| 0.5 * inertia.m.iter().zip(&state.v).map(|(m, v)| m * v.norm_squared()).sum::<f64>());
+}

@@ -1,0 +1,165 @@
+//! Sparse Cholesky factorisation; the symbolic part is kept for the life of the pattern.
+
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::perm::PermRef;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
+
+use super::{LinearSolver, nested_dissection};
+use crate::fem::{BlockMatrix, Pattern};
+use crate::math::Vec3;
+
+/// Supernodal Cholesky in double precision, one thread; the same bits whatever the machine's load.
+pub struct Cholesky {
+    scalar: SymbolicSparseColMat<u32>,
+    values: Vec<f64>,
+    symbolic: SymbolicCholesky<u32>,
+    factor: Vec<f64>,
+    rhs: Vec<f64>,
+    scratch: MemBuffer,
+}
+
+impl Cholesky {
+    /// Orders and analyses the pattern, and allocates everything later calls need.
+    pub fn analyse(pattern: &Pattern) -> Cholesky {
+        let n = 3 * pattern.n();
+        let scalar = scalar_pattern(pattern);
+        let order = nested_dissection(pattern).map(|blocks| {
+            let new_to_old: Vec<u32> = blocks.iter().flat_map(|b| [3 * b, 3 * b + 1, 3 * b + 2]).collect();
+            let mut old_to_new = vec![0u32; n];
+            for (new, &old) in new_to_old.iter().enumerate() {
+                old_to_new[old as usize] = new as u32;
+            }
+            (new_to_old, old_to_new)
+        });
+        let ordering = match &order {
+            Some((forward, inverse)) => SymmetricOrdering::Custom(PermRef::new_checked(forward, inverse, n)),
+            None => SymmetricOrdering::Amd,
+        };
+        let symbolic =
+            factorize_symbolic_cholesky(scalar.as_ref(), Side::Lower, ordering, CholeskySymbolicParams::default())
+                .expect("a mesh graph's factor fits the index type and memory");
+        let scratch = StackReq::or(
+            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+        );
+        Cholesky {
+            values: vec![0.0; scalar.row_idx().len()],
+            factor: vec![0.0; symbolic.len_val()],
+            rhs: vec![0.0; n],
+            scratch: MemBuffer::new(scratch),
+            scalar,
+            symbolic,
+        }
+    }
+
+    /// Stored entries of the factor.
+    pub fn factor_len(&self) -> usize {
+        self.factor.len()
+    }
+}
+
+impl LinearSolver for Cholesky {
+    fn factor(&mut self, A: &BlockMatrix) -> Result<(), usize> {
+        scalar_values(A, &mut self.values);
+        let A = SparseColMatRef::new(self.scalar.as_ref(), &self.values);
+        self.symbolic
+            .factorize_numeric_llt(
+                &mut self.factor,
+                A,
+                Side::Lower,
+                Default::default(),
+                Par::Seq,
+                MemStack::new(&mut self.scratch),
+                Default::default(),
+            )
+            .map(drop)
+            .map_err(|e| match e {
+                faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => index / 3,
+            })
+    }
+
+    fn solve(&mut self, b: &mut [Vec3]) {
+        for (to, from) in self.rhs.chunks_exact_mut(3).zip(&*b) {
+            to.copy_from_slice(from.as_slice());
+        }
+        let n = self.rhs.len();
+        LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(&mut self.rhs, n, 1),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+        );
+        for (to, from) in b.iter_mut().zip(self.rhs.chunks_exact(3)) {
+            to.copy_from_slice(from);
+        }
+    }
+}
+
+/// Scalar lower triangle of a block pattern, columns ascending.
+fn scalar_pattern(pattern: &Pattern) -> SymbolicSparseColMat<u32> {
+    let n = pattern.n();
+    let mut start = vec![0u32; 3 * n + 1];
+    let mut row = Vec::with_capacity(9 * pattern.row.len());
+    for j in 0..n {
+        let below = &pattern.row[pattern.start[j] as usize + 1..pattern.start[j + 1] as usize];
+        for c in 0..3u32 {
+            row.extend((c..3).map(|r| 3 * j as u32 + r));
+            row.extend(below.iter().flat_map(|i| [3 * i, 3 * i + 1, 3 * i + 2]));
+            start[3 * j + c as usize + 1] = row.len() as u32;
+        }
+    }
+    SymbolicSparseColMat::new_checked(3 * n, 3 * n, start, None, row)
+}
+
+/// The numbers on [`scalar_pattern`], in its order.
+fn scalar_values(A: &BlockMatrix, values: &mut [f64]) {
+    let mut k = 0;
+    for j in 0..A.pattern.n() {
+        let (from, to) = (A.pattern.start[j] as usize, A.pattern.start[j + 1] as usize);
+        for c in 0..3 {
+            let diagonal = &A.blocks[from].as_slice()[4 * c..3 * c + 3];
+            values[k..k + diagonal.len()].copy_from_slice(diagonal);
+            k += diagonal.len();
+            for B in &A.blocks[from + 1..to] {
+                values[k..k + 3].copy_from_slice(&B.as_slice()[3 * c..3 * c + 3]);
+                k += 3;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Mat3;
+
+    #[test]
+    fn solves_a_random_block_system() {
+        let n = 40;
+        let edges = (1..n as u32).flat_map(|i| [(i, i - 1), (i, i / 3)]);
+        let mut A = BlockMatrix::zeros(Pattern::new(n, edges));
+        for j in 0..n {
+            for k in A.pattern.start[j] as usize..A.pattern.start[j + 1] as usize {
+                let noise = Mat3::from_fn(|r, c| ((7 * k + 3 * r + c) as f64).sin());
+                A.blocks[k] = if A.pattern.row[k] as usize == j {
+                    noise + noise.transpose() + 20.0 * Mat3::identity()
+                } else {
+                    noise
+                };
+            }
+        }
+        let x: Vec<Vec3> = (0..n).map(|i| Vec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
+        let mut b = vec![Vec3::zeros(); n];
+        A.multiply(&x, &mut b);
+        let mut solver = Cholesky::analyse(&A.pattern);
+        solver.factor(&A).expect("diagonally dominant");
+        solver.solve(&mut b);
+        assert!(x.iter().zip(&b).all(|(x, b)| (x - b).norm() < 1e-10));
+        A.blocks[0] = -Mat3::identity();
+        assert!(solver.factor(&A).is_err());
+    }
+}

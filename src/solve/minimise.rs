@@ -1,0 +1,297 @@
+//! Descent on the energy: L-BFGS over a kept factor, or Newton with a new factor in every iteration.
+//!
+//! Both are one loop: Newton is the strategy with no memory that refactors every time. Every accepted step lowers the
+//! energy (Armijo), so it cannot blow up.
+//!
+//! Source: Liu, Bouaziz & Kavan, "Quasi-Newton methods for real-time simulation of hyperelastic materials", ACM TOG
+//! 36(3), 2017; line search after Nocedal & Wright, "Numerical Optimization", 2nd ed., 2006, sections 3.1 and 3.5, with
+//! the approximate condition of Hager & Zhang, SIAM J. Optim. 16(1), 2005, where energy differences drown in round-off.
+
+use super::lbfgs::{Lbfgs, dot};
+use super::{Cholesky, LinearSolver, Problem, SolveError};
+use crate::fem::{Assembly, Configuration, Curvature};
+use crate::math::{Mat3, Vec3};
+
+/// How the minimum is sought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strategy {
+    /// Pairs that L-BFGS remembers; 0 for Newton.
+    pub memory: usize,
+    /// Iterations after which the stiffness is factored anew; 1 for Newton.
+    pub refresh_after: u32,
+    /// Largest nodal motion of the last correction, m.
+    pub tolerance: f64,
+    /// Most linear solves in one minimisation.
+    pub max_iterations: u32,
+}
+
+/// How a minimisation ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Linear solves.
+    pub iterations: u32,
+    /// Factorisations.
+    pub factorisations: u32,
+    /// Largest nodal motion of the last correction, m.
+    pub correction: f64,
+    /// Norm of the gradient of the unknowns, N (torques by their number).
+    pub residual: f64,
+}
+
+/// Fraction of the promised descent that a step must keep.
+const ARMIJO: f64 = 1e-4;
+/// Relative round-off of an energy sum.
+const ENERGY_NOISE: f64 = 1e-12;
+/// Shortenings before a direction is given up; the last one tries 2^-30 of it.
+const MAX_SHORTENINGS: u32 = 30;
+/// Iterations that a shortened step counts for when the factor's age is judged.
+const SHORTENED_AGES: u32 = 4;
+
+/// The linear algebra of one model: pattern, factor and buffers. Allocates only when made.
+pub struct Minimiser {
+    assembly: Assembly,
+    cholesky: Cholesky,
+    memory: Lbfgs,
+    strategy: Strategy,
+    /// Rotation from the configuration that was factored to the one at hand.
+    frame: Mat3,
+    factored: bool,
+    /// Where the factor was made.
+    factored_at: Configuration,
+    trial: Configuration,
+    lag: Configuration,
+    /// Gradient at the nodes, reactions included, N.
+    nodal: Vec<Vec3>,
+    g: Vec<Vec3>,
+    g_trial: Vec<Vec3>,
+    d: Vec<Vec3>,
+}
+
+impl Minimiser {
+    /// Analyses the pattern of the problem's terms and allocates.
+    pub fn new(problem: &Problem, strategy: Strategy) -> Minimiser {
+        let assembly = Assembly::new(problem.terms, problem.dofs);
+        let n = problem.dofs.n_blocks();
+        let config =
+            Configuration { x: problem.X.to_vec(), poses: vec![crate::math::Pose::REST; problem.pivots.len()] };
+        Minimiser {
+            cholesky: Cholesky::analyse(&assembly.K.pattern),
+            assembly,
+            memory: Lbfgs::new(strategy.memory, n),
+            strategy,
+            frame: Mat3::identity(),
+            factored: false,
+            factored_at: config.clone(),
+            trial: config.clone(),
+            lag: config,
+            nodal: vec![Vec3::zeros(); problem.X.len()],
+            g: vec![Vec3::zeros(); n],
+            g_trial: vec![Vec3::zeros(); n],
+            d: vec![Vec3::zeros(); n],
+        }
+    }
+
+    /// Gradient at the nodes after the last minimisation, N: on prescribed nodes minus the reaction of the tissue.
+    pub fn nodal_gradient(&self) -> &[Vec3] {
+        &self.nodal
+    }
+
+    /// Stored entries of the factor.
+    pub fn factor_len(&self) -> usize {
+        self.cholesky.factor_len()
+    }
+
+    /// Whether a factor is at hand.
+    pub fn is_factored(&self) -> bool {
+        self.factored
+    }
+
+    /// Where the factor at hand was made.
+    pub fn factored_at(&self) -> &Configuration {
+        &self.factored_at
+    }
+
+    /// Turns the kept factor along with the bones; the identity where it was made.
+    pub fn set_frame(&mut self, frame: Mat3) {
+        self.frame = frame;
+    }
+
+    /// Factors the stiffness at `config`; the true one where it is positive definite, else the projected one.
+    ///
+    /// # Errors
+    /// [`SolveError::Singular`] if even the projected stiffness is not positive definite.
+    pub fn linearise(&mut self, problem: &Problem, config: &Configuration) -> Result<(), SolveError> {
+        self.lag.copy_from(config);
+        self.factored_at.copy_from(config);
+        problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
+        self.factored = false;
+        self.frame = Mat3::identity();
+        self.memory.forget();
+        for curvature in [Curvature::Exact, Curvature::Projected] {
+            problem.assemble(&mut self.assembly, config, &self.nodal, curvature);
+            match self.cholesky.factor(&self.assembly.K) {
+                Ok(()) => {
+                    self.factored = true;
+                    return Ok(());
+                }
+                Err(block) if curvature == Curvature::Projected => {
+                    return Err(SolveError::Singular { block, n_blocks: problem.dofs.n_blocks() });
+                }
+                Err(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves `config` to where the factor at hand expects the equilibrium once the prescribed nodes have gone by `u`:
+    /// `K d = -(g + K_p u)`. The prescribed nodes of `config` are moved, too.
+    pub fn predict(&mut self, problem: &Problem, config: &mut Configuration, u: &[Vec3]) {
+        let Minimiser { assembly, cholesky, frame, lag, nodal, g, d, trial, .. } = self;
+        lag.copy_from(config);
+        problem.gradient(config, lag, nodal, g);
+        d.fill(Vec3::zeros());
+        assembly.K_p.add_product(|p| frame.tr_mul(&u[p]), d);
+        for (d, g) in d.iter_mut().zip(&*g) {
+            *d = -(*d + frame.tr_mul(g));
+        }
+        cholesky.solve(d);
+        turn(frame, d);
+        trial.copy_from(config);
+        for (&a, u) in problem.dofs.prescribed.iter().zip(u) {
+            trial.x[a as usize] += u;
+        }
+        problem.dofs.retract(problem.X, problem.pivots, config, 1.0, d, trial);
+        config.copy_from(trial);
+    }
+
+    /// Minimises from `config` on, which ends at the best point found.
+    ///
+    /// # Errors
+    /// [`SolveError`]; `config` is then not an equilibrium.
+    pub fn minimise(&mut self, problem: &Problem, config: &mut Configuration) -> Result<Outcome, SolveError> {
+        let lagged = problem.is_lagged();
+        let newton = self.strategy.memory == 0;
+        let mut outcome =
+            Outcome { iterations: 0, factorisations: 0, correction: f64::INFINITY, residual: f64::INFINITY };
+        let mut age = 0;
+        self.memory.forget();
+        self.lag.copy_from(config);
+        self.trial.copy_from(config);
+        let mut energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
+        if !energy.is_finite() {
+            return Err(SolveError::NotFinite("some element is inverted or a position is not a number"));
+        }
+        loop {
+            let stale = newton && outcome.iterations > 0 && !problem.is_quadratic();
+            if !self.factored || stale || age >= self.strategy.refresh_after.max(2) && !problem.is_quadratic() {
+                self.linearise(problem, config)?;
+                outcome.factorisations += 1;
+                age = 0;
+            }
+            let mut slope = self.direction();
+            outcome.iterations += 1;
+            if slope >= 0.0 || slope.is_nan() {
+                self.memory.forget();
+                slope = self.direction();
+                outcome.iterations += 1;
+            }
+            outcome.correction = problem.dofs.largest_motion(&self.d, config, problem.pivots);
+            let last = outcome.correction <= self.strategy.tolerance;
+            match self.search(problem, config, energy, slope) {
+                Some((alpha, new_energy)) => {
+                    self.memory.remember(alpha, &self.d, &self.g, &self.g_trial);
+                    std::mem::swap(&mut self.g, &mut self.g_trial);
+                    config.copy_from(&self.trial);
+                    energy = new_energy;
+                    age += if alpha < 1.0 { SHORTENED_AGES } else { 1 };
+                }
+                // A step below the tolerance that round-off cannot tell from none is no failure.
+                None if last => {
+                    energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
+                }
+                None if self.memory.is_empty() && (age == 0 || problem.is_quadratic()) => {
+                    return Err(self.not_converged(outcome));
+                }
+                None if outcome.iterations >= self.strategy.max_iterations => {
+                    return Err(self.not_converged(outcome));
+                }
+                None => {
+                    energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
+                    if self.memory.is_empty() {
+                        age = u32::MAX;
+                    }
+                    self.memory.forget();
+                    continue;
+                }
+            }
+            if lagged {
+                self.lag.copy_from(config);
+                energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
+            }
+            outcome.residual = dot(&self.g, &self.g).sqrt();
+            if last {
+                return Ok(outcome);
+            }
+            if outcome.iterations >= self.strategy.max_iterations {
+                return Err(self.not_converged(outcome));
+            }
+        }
+    }
+
+    fn not_converged(&self, outcome: Outcome) -> SolveError {
+        SolveError::NotConverged {
+            iterations: outcome.iterations,
+            correction: outcome.correction,
+            tolerance: self.strategy.tolerance,
+            residual: dot(&self.g, &self.g).sqrt(),
+        }
+    }
+
+    /// `d = -H g`; returns the slope `g.d`.
+    fn direction(&mut self) -> f64 {
+        let Minimiser { cholesky, memory, frame, g, d, .. } = self;
+        d.copy_from_slice(g);
+        memory.apply(d, |q| {
+            turn(&frame.transpose(), q);
+            cholesky.solve(q);
+            turn(frame, q);
+        });
+        for d in d.iter_mut() {
+            *d = -*d;
+        }
+        dot(&self.g, &self.d)
+    }
+
+    /// Shortens the step along `d` until the energy falls enough; leaves the new point in `trial`, its gradient in
+    /// `g_trial`. Returns the length and the energy, or `None` if no length serves.
+    fn search(&mut self, problem: &Problem, config: &Configuration, energy: f64, slope: f64) -> Option<(f64, f64)> {
+        if slope >= 0.0 || slope.is_nan() {
+            return None;
+        }
+        let mut alpha = 1.0;
+        for _ in 0..=MAX_SHORTENINGS {
+            problem.dofs.retract(problem.X, problem.pivots, config, alpha, &self.d, &mut self.trial);
+            let tried = problem.gradient(&self.trial, &self.lag, &mut self.nodal, &mut self.g_trial);
+            let noise = ENERGY_NOISE * (energy.abs() + tried.abs());
+            if tried <= energy + ARMIJO * alpha * slope {
+                return Some((alpha, tried));
+            }
+            let new_slope = dot(&self.g_trial, &self.d);
+            if (tried - energy).abs() <= noise && new_slope.abs() <= -slope {
+                return Some((alpha, tried));
+            }
+            // Minimum of the parabola through energy, slope and tried; halved where that says nothing.
+            let parabola = -0.5 * slope * alpha * alpha / (tried - energy - slope * alpha);
+            alpha = if parabola.is_finite() { parabola.clamp(0.1 * alpha, 0.5 * alpha) } else { 0.5 * alpha };
+        }
+        None
+    }
+}
+
+fn turn(R: &Mat3, vectors: &mut [Vec3]) {
+    if *R != Mat3::identity() {
+        for v in vectors {
+            *v = R * *v;
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Minimisation of a sum of terms over the unknowns: sparse Cholesky, quasi-Newton and Newton steps, line search.
+#![forbid(unsafe_code)]
+#![allow(non_snake_case)]
+
+mod cholesky;
+mod lbfgs;
+mod minimise;
+mod ordering;
+mod problem;
+
+pub use cholesky::Cholesky;
+pub use minimise::{Minimiser, Outcome, Strategy};
+pub use ordering::nested_dissection;
+pub use problem::Problem;
+
+/// Why a step was refused. The state is still the last accepted one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// The iteration budget ran out.
+    #[error(
+        "the equilibrium was not reached: after {iterations} linear solves the last correction moves a node by \
+         {correction:.1e} m (wanted {tolerance:.1e} m) at a residual of {residual:.1e} N"
+    )]
+    NotConverged {
+        /// Linear solves spent.
+        iterations: u32,
+        /// Largest nodal motion of the last correction, m.
+        correction: f64,
+        /// Tolerance, m.
+        tolerance: f64,
+        /// Norm of the force residual, N.
+        residual: f64,
+    },
+    /// The stiffness is singular: something can move without any resistance.
+    #[error(
+        "the stiffness matrix is not positive definite at block {block} of {n_blocks}, even with projected tangents: \
+         a part of the tissue can move freely; hold a bone of it, or add [inertia]"
+    )]
+    Singular {
+        /// Block at which the factorisation stopped.
+        block: usize,
+        /// Blocks in total.
+        n_blocks: usize,
+    },
+    /// The energy is not finite at the start of the step.
+    #[error("the energy is not finite where the step starts: {0}")]
+    NotFinite(&'static str),
+}
+
+/// A solver for symmetric positive definite systems of 3x3 blocks.
+pub trait LinearSolver {
+    /// Takes new numbers on the known pattern.
+    ///
+    /// # Errors
+    /// The block at which the matrix is found not to be positive definite.
+    fn factor(&mut self, A: &crate::fem::BlockMatrix) -> Result<(), usize>;
+
+    /// Replaces the right-hand side `b` by the solution; allocates nothing.
+    fn solve(&mut self, b: &mut [crate::math::Vec3]);
+}
