@@ -156,7 +156,9 @@ unsafe fn ask<R: Copy>(sim: *const CutisSim, port: usize, otherwise: R, answer: 
 
 fn port_at(inner: &Inner, port: usize) -> Result<&Port, Failure> {
     let ports = inner.sim.model().ports();
-    ports.get(port).ok_or_else(|| argument(format!("there is no port {port}; ports are numbered from 0 to {}", ports.len().saturating_sub(1))))
+    ports.get(port).ok_or_else(|| {
+        argument(format!("there is no port {port}; ports are numbered from 0 to {}", ports.len().saturating_sub(1)))
+    })
 }
 
 /// The port, if it has this type and `len` values.
@@ -231,11 +233,17 @@ pub extern "C" fn cutis_abi() -> u32 {
 /// # Safety
 /// `path` is NULL or a zero-terminated string; `why` is NULL or holds `why_len` bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_sim_new_from_file(path: *const c_char, why: *mut c_char, why_len: usize) -> *mut CutisSim {
+pub unsafe extern "C" fn cutis_sim_new_from_file(
+    path: *const c_char,
+    why: *mut c_char,
+    why_len: usize,
+) -> *mut CutisSim {
     // SAFETY: the caller's promise about `path` and `why`.
     unsafe {
         let path = pointer::text(path);
-        new_sim(why, why_len, || load::from_file(Path::new(path.ok_or("`path` is NULL or not UTF-8")?)).map_err(in_words))
+        new_sim(why, why_len, || {
+            load::from_file(Path::new(path.ok_or("`path` is NULL or not UTF-8")?)).map_err(in_words)
+        })
     }
 }
 
@@ -248,7 +256,12 @@ pub unsafe extern "C" fn cutis_sim_new_from_file(path: *const c_char, why: *mut 
 /// # Safety
 /// `scene` and `folder` are NULL or zero-terminated strings; `why` is NULL or holds `why_len` bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_sim_new_from_text(scene: *const c_char, folder: *const c_char, why: *mut c_char, why_len: usize) -> *mut CutisSim {
+pub unsafe extern "C" fn cutis_sim_new_from_text(
+    scene: *const c_char,
+    folder: *const c_char,
+    why: *mut c_char,
+    why_len: usize,
+) -> *mut CutisSim {
     // SAFETY: the caller's promise about `scene`, `folder` and `why`.
     unsafe {
         let (scene, named) = (pointer::text(scene), pointer::text(folder));
@@ -295,7 +308,8 @@ pub unsafe extern "C" fn cutis_sim_free(sim: *mut CutisSim) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cutis_sim_message(sim: *const CutisSim, buffer: *mut c_char, len: usize) -> usize {
     // SAFETY: the caller's promise.
-    unsafe { guard::with(sim.cast_mut().cast::<Handle<Inner>>(), |inner| copy_text(&inner.message, buffer, len)) }.unwrap_or(0)
+    unsafe { guard::with(sim.cast_mut().cast::<Handle<Inner>>(), |inner| copy_text(&inner.message, buffer, len)) }
+        .unwrap_or(0)
 }
 
 /// Number of ports: everything a host can set or get. They keep their order for the life of the handle.
@@ -323,7 +337,8 @@ pub unsafe extern "C" fn cutis_port_find(sim: *const CutisSim, name: *const c_ch
     let mut found = usize::MAX;
     let body = |inner: &mut Inner| {
         // SAFETY: the caller's promise.
-        let name = unsafe { pointer::text(name) }.ok_or_else(|| Failure(CutisStatus::CUTIS_NULL, "`name` is NULL or not UTF-8".to_owned()))?;
+        let name = unsafe { pointer::text(name) }
+            .ok_or_else(|| Failure(CutisStatus::CUTIS_NULL, "`name` is NULL or not UTF-8".to_owned()))?;
         let ports = inner.sim.model().ports();
         found = ports.iter().position(|p| p.name == name).ok_or_else(|| {
             let names: Vec<&str> = ports.iter().map(|p| p.name.as_str()).collect();
@@ -361,7 +376,12 @@ pub unsafe extern "C" fn cutis_port_unit(sim: *const CutisSim, port: usize, buff
 /// # Safety
 /// `sim` is NULL or a live handle; `buffer` is NULL or holds `len` bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_port_description(sim: *const CutisSim, port: usize, buffer: *mut c_char, len: usize) -> usize {
+pub unsafe extern "C" fn cutis_port_description(
+    sim: *const CutisSim,
+    port: usize,
+    buffer: *mut c_char,
+    len: usize,
+) -> usize {
     // SAFETY: the caller's promise.
     unsafe { ask(sim, port, 0, |p| copy_text(&p.description, buffer, len)) }
 }
@@ -372,7 +392,13 @@ pub unsafe extern "C" fn cutis_port_description(sim: *const CutisSim, port: usiz
 /// # Safety
 /// `sim` is NULL or a live handle; `buffer` is NULL or holds `len` bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_port_row(sim: *const CutisSim, port: usize, row: usize, buffer: *mut c_char, len: usize) -> usize {
+pub unsafe extern "C" fn cutis_port_row(
+    sim: *const CutisSim,
+    port: usize,
+    row: usize,
+    buffer: *mut c_char,
+    len: usize,
+) -> usize {
     // SAFETY: the caller's promise.
     unsafe { ask(sim, port, 0, |p| p.rows.get(row).map_or(0, |name| copy_text(name, buffer, len))) }
 }
@@ -446,7 +472,12 @@ pub unsafe extern "C" fn cutis_port_causality(sim: *const CutisSim, port: usize)
 /// # Safety
 /// `sim` is NULL or a live handle; `values` is NULL or holds `len` numbers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_sim_set_f64(sim: *mut CutisSim, port: usize, values: *const f64, len: usize) -> CutisStatus {
+pub unsafe extern "C" fn cutis_sim_set_f64(
+    sim: *mut CutisSim,
+    port: usize,
+    values: *const f64,
+    len: usize,
+) -> CutisStatus {
     let body = |inner: &mut Inner| {
         let found = exact(inner, port, Type::Float64, len)?;
         if !found.is_settable() {
@@ -454,9 +485,13 @@ pub unsafe extern "C" fn cutis_sim_set_f64(sim: *mut CutisSim, port: usize, valu
         }
         // SAFETY: the caller's promise.
         let values = unsafe { pointer::slice(values, len, "values")? };
-        let legal = |v: &f64| v.is_finite() && found.min.is_none_or(|min| *v >= min) && found.max.is_none_or(|max| *v <= max);
+        let legal =
+            |v: &f64| v.is_finite() && found.min.is_none_or(|min| *v >= min) && found.max.is_none_or(|max| *v <= max);
         if let Some(k) = values.iter().position(|v| !legal(v)) {
-            return Err(argument(format!("element {k} of `{}` was set to {} {}, which is not finite or out of range", found.name, values[k], found.unit)));
+            return Err(argument(format!(
+                "element {k} of `{}` was set to {} {}, which is not finite or out of range",
+                found.name, values[k], found.unit
+            )));
         }
         inner.sim.set_f64(port, 0, values).map_err(|why| argument(chain(&why)))
     };
@@ -471,7 +506,12 @@ pub unsafe extern "C" fn cutis_sim_set_f64(sim: *mut CutisSim, port: usize, valu
 /// # Safety
 /// `sim` is NULL or a live handle; `values` is NULL or holds `len` numbers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_sim_get_f64(sim: *const CutisSim, port: usize, values: *mut f64, len: usize) -> CutisStatus {
+pub unsafe extern "C" fn cutis_sim_get_f64(
+    sim: *const CutisSim,
+    port: usize,
+    values: *mut f64,
+    len: usize,
+) -> CutisStatus {
     let body = |inner: &mut Inner| {
         exact(inner, port, Type::Float64, len)?;
         // SAFETY: the caller's promise.
@@ -489,7 +529,12 @@ pub unsafe extern "C" fn cutis_sim_get_f64(sim: *const CutisSim, port: usize, va
 /// # Safety
 /// `sim` is NULL or a live handle; `values` is NULL or holds `len` numbers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_sim_get_i32(sim: *const CutisSim, port: usize, values: *mut i32, len: usize) -> CutisStatus {
+pub unsafe extern "C" fn cutis_sim_get_i32(
+    sim: *const CutisSim,
+    port: usize,
+    values: *mut i32,
+    len: usize,
+) -> CutisStatus {
     let body = |inner: &mut Inner| {
         exact(inner, port, Type::Int32, len)?;
         // SAFETY: the caller's promise.
@@ -507,7 +552,12 @@ pub unsafe extern "C" fn cutis_sim_get_i32(sim: *const CutisSim, port: usize, va
 /// # Safety
 /// `sim` is NULL or a live handle; `values` is NULL or holds `len` bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_sim_get_bool(sim: *const CutisSim, port: usize, values: *mut u8, len: usize) -> CutisStatus {
+pub unsafe extern "C" fn cutis_sim_get_bool(
+    sim: *const CutisSim,
+    port: usize,
+    values: *mut u8,
+    len: usize,
+) -> CutisStatus {
     let body = |inner: &mut Inner| {
         exact(inner, port, Type::Boolean, len)?;
         // SAFETY: the caller's promise.
@@ -550,7 +600,9 @@ pub unsafe extern "C" fn cutis_sim_set_time(sim: *mut CutisSim, time: f64) -> Cu
 /// `sim` is NULL or a live handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cutis_sim_initialise(sim: *mut CutisSim) -> CutisStatus {
-    let body = |inner: &mut Inner| inner.sim.initialise().map(drop).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)));
+    let body = |inner: &mut Inner| {
+        inner.sim.initialise().map(drop).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))
+    };
     // SAFETY: the caller's promise.
     unsafe { with(sim, body) }
 }
@@ -689,13 +741,20 @@ pub unsafe extern "C" fn cutis_state_size(sim: *const CutisSim, state: *const Cu
 /// `sim` is NULL or a live handle of the state's scene; `state` is NULL or a live state; `bytes` is NULL or holds `len`
 /// bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_state_serialize(sim: *const CutisSim, state: *const CutisState, bytes: *mut u8, len: usize) -> CutisStatus {
+pub unsafe extern "C" fn cutis_state_serialize(
+    sim: *const CutisSim,
+    state: *const CutisState,
+    bytes: *mut u8,
+    len: usize,
+) -> CutisStatus {
     let body = |inner: &mut Inner| {
         // SAFETY: the caller's promise.
         let written = unsafe { state_at(state)? }.state.to_bytes(inner.sim.model());
         // SAFETY: the caller's promise.
         let out = unsafe { pointer::slice_mut(bytes, len, "bytes")? };
-        let out = out.get_mut(..written.len()).ok_or_else(|| argument(format!("{len} bytes cannot hold a state of {}", written.len())))?;
+        let out = out
+            .get_mut(..written.len())
+            .ok_or_else(|| argument(format!("{len} bytes cannot hold a state of {}", written.len())))?;
         out.copy_from_slice(&written);
         Ok(())
     };
@@ -710,11 +769,17 @@ pub unsafe extern "C" fn cutis_state_serialize(sim: *const CutisSim, state: *con
 /// # Safety
 /// `sim` is NULL or a live handle; `bytes` is NULL or holds `len` bytes; `state` is NULL or the place of a pointer.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn cutis_state_deserialize(sim: *const CutisSim, bytes: *const u8, len: usize, state: *mut *mut CutisState) -> CutisStatus {
+pub unsafe extern "C" fn cutis_state_deserialize(
+    sim: *const CutisSim,
+    bytes: *const u8,
+    len: usize,
+    state: *mut *mut CutisState,
+) -> CutisStatus {
     let body = |inner: &mut Inner| {
         // SAFETY: the caller's promise.
         let (bytes, state) = unsafe { (pointer::slice(bytes, len, "bytes")?, place(state, "state")?) };
-        let read = State::from_bytes(bytes, inner.sim.model()).map_err(|why| Failure(CutisStatus::CUTIS_STATE, chain(&why)))?;
+        let read = State::from_bytes(bytes, inner.sim.model())
+            .map_err(|why| Failure(CutisStatus::CUTIS_STATE, chain(&why)))?;
         *state = Box::into_raw(Box::new(CutisState { tag: STATE_TAG, state: read }));
         Ok(())
     };

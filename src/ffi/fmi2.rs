@@ -46,7 +46,8 @@ pub struct fmi2CallbackFunctions {
 /// `c` is null or came from `fmi2Instantiate` and was not freed.
 unsafe fn on(c: fmi2Component, call: Call, body: impl FnOnce(&mut Instance) -> Answer) -> Status {
     // SAFETY: the caller's promise.
-    unsafe { guard::with(c.cast::<Handle<Instance2>>(), |i| i.common.answer(call, modes::ERROR, body)) }.unwrap_or(Status::Error)
+    unsafe { guard::with(c.cast::<Handle<Instance2>>(), |i| i.common.answer(call, modes::ERROR, body)) }
+        .unwrap_or(Status::Error)
 }
 
 /// Functions that the component does not offer: Error and a line in the log.
@@ -78,13 +79,20 @@ pub extern "C" fn fmi2GetVersion() -> *const c_char {
 
 /// `fmi2SetDebugLogging`: no categories means all.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetDebugLogging(c: fmi2Component, loggingOn: fmi2Boolean, nCategories: usize, categories: *const *const c_char) -> Status {
+pub unsafe extern "C" fn fmi2SetDebugLogging(
+    c: fmi2Component,
+    loggingOn: fmi2Boolean,
+    nCategories: usize,
+    categories: *const *const c_char,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes `nCategories` strings, or null.
         let names = unsafe { slice(categories, nCategories, "categories")? };
         // SAFETY: each of them is a string, or null.
         let names = names.iter().map(|&name| unsafe { text(name) }.unwrap_or(""));
-        i.logger.configure(truth(loggingOn), names).map_err(|name| error(format!("log category `{name}` is not declared")))
+        i.logger
+            .configure(truth(loggingOn), names)
+            .map_err(|name| error(format!("log category `{name}` is not declared")))
     };
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::SET_DEBUG_LOGGING, body) }
@@ -169,7 +177,13 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
     stopTimeDefined: fmi2Boolean,
     stopTime: f64,
 ) -> Status {
-    let body = |i: &mut Instance| i.set_experiment(truth(toleranceDefined).then_some(tolerance), startTime, truth(stopTimeDefined).then_some(stopTime));
+    let body = |i: &mut Instance| {
+        i.set_experiment(
+            truth(toleranceDefined).then_some(tolerance),
+            startTime,
+            truth(stopTimeDefined).then_some(stopTime),
+        )
+    };
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::SETUP_EXPERIMENT, body) }
 }
@@ -222,7 +236,9 @@ pub unsafe extern "C" fn fmi2Reset(c: fmi2Component) -> Status {
 fn run(instance: &Instance, references: &[c_uint], k: usize, ty: Type) -> Result<(usize, usize, usize), Refusal> {
     let unknown = || error(format!("no variable has value reference {}", references[k]));
     let (reference, offset) = fmu::split_scalar_reference(references[k]);
-    let (index, port) = instance.port(reference, ty).map_err(|why| if why.message.starts_with("no variable") { unknown() } else { why })?;
+    let (index, port) = instance
+        .port(reference, ty)
+        .map_err(|why| if why.message.starts_with("no variable") { unknown() } else { why })?;
     if offset >= port.len() || !fmu::in_fmi2(port) {
         return Err(unknown());
     }
@@ -232,7 +248,12 @@ fn run(instance: &Instance, references: &[c_uint], k: usize, ty: Type) -> Result
 }
 
 /// Walks over all runs of `references`.
-fn each_run(instance: &mut Instance, references: &[c_uint], ty: Type, mut visit: impl FnMut(&mut Instance, usize, usize, std::ops::Range<usize>) -> Answer) -> Answer {
+fn each_run(
+    instance: &mut Instance,
+    references: &[c_uint],
+    ty: Type,
+    mut visit: impl FnMut(&mut Instance, usize, usize, std::ops::Range<usize>) -> Answer,
+) -> Answer {
     let mut k = 0;
     while k < references.len() {
         let (port, offset, n) = run(instance, references, k, ty)?;
@@ -276,7 +297,12 @@ pub unsafe extern "C" fn fmi2GetInteger(c: fmi2Component, vr: *const c_uint, nvr
 
 /// `fmi2GetBoolean`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBoolean(c: fmi2Component, vr: *const c_uint, nvr: usize, value: *mut fmi2Boolean) -> Status {
+pub unsafe extern "C" fn fmi2GetBoolean(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    value: *mut fmi2Boolean,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of this length, or null.
         let (references, out) = unsafe { (slice(vr, nvr, "vr")?, slice_mut(value, nvr, "value")?) };
@@ -295,7 +321,12 @@ pub unsafe extern "C" fn fmi2GetBoolean(c: fmi2Component, vr: *const c_uint, nvr
 
 /// `fmi2GetString`: no variable is a string.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetString(c: fmi2Component, vr: *const c_uint, nvr: usize, value: *mut *const c_char) -> Status {
+pub unsafe extern "C" fn fmi2GetString(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    value: *mut *const c_char,
+) -> Status {
     let _ = (vr, value);
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::get("fmi2GetString"), |_| none_of(nvr, "no variable is a string")) }
@@ -307,7 +338,9 @@ pub unsafe extern "C" fn fmi2SetReal(c: fmi2Component, vr: *const c_uint, nvr: u
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of this length, or null.
         let (references, values) = unsafe { (slice(vr, nvr, "vr")?, slice(value, nvr, "value")?) };
-        each_run(i, references, Type::Float64, |i, port, offset, range| i.check_set(&i.sim.model().ports()[port], offset, &values[range]))?;
+        each_run(i, references, Type::Float64, |i, port, offset, range| {
+            i.check_set(&i.sim.model().ports()[port], offset, &values[range])
+        })?;
         each_run(i, references, Type::Float64, |i, port, offset, range| i.set(port, offset, &values[range]))
     };
     // SAFETY: the host's promise about its instance.
@@ -316,7 +349,12 @@ pub unsafe extern "C" fn fmi2SetReal(c: fmi2Component, vr: *const c_uint, nvr: u
 
 /// `fmi2SetInteger`: no integer can be set.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetInteger(c: fmi2Component, vr: *const c_uint, nvr: usize, value: *const c_int) -> Status {
+pub unsafe extern "C" fn fmi2SetInteger(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    value: *const c_int,
+) -> Status {
     let _ = (vr, value);
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::set("fmi2SetInteger"), |_| none_of(nvr, "no integer can be set")) }
@@ -324,7 +362,12 @@ pub unsafe extern "C" fn fmi2SetInteger(c: fmi2Component, vr: *const c_uint, nvr
 
 /// `fmi2SetBoolean`: no truth value can be set.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetBoolean(c: fmi2Component, vr: *const c_uint, nvr: usize, value: *const fmi2Boolean) -> Status {
+pub unsafe extern "C" fn fmi2SetBoolean(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    value: *const fmi2Boolean,
+) -> Status {
     let _ = (vr, value);
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::set("fmi2SetBoolean"), |_| none_of(nvr, "no truth value can be set")) }
@@ -332,7 +375,12 @@ pub unsafe extern "C" fn fmi2SetBoolean(c: fmi2Component, vr: *const c_uint, nvr
 
 /// `fmi2SetString`: no variable is a string.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetString(c: fmi2Component, vr: *const c_uint, nvr: usize, value: *const *const c_char) -> Status {
+pub unsafe extern "C" fn fmi2SetString(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    value: *const *const c_char,
+) -> Status {
     let _ = (vr, value);
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::set("fmi2SetString"), |_| none_of(nvr, "no variable is a string")) }
@@ -383,7 +431,11 @@ pub unsafe extern "C" fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2F
 
 /// `fmi2SerializedFMUstateSize`, bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializedFMUstateSize(c: fmi2Component, FMUstate: fmi2FMUstate, size: *mut usize) -> Status {
+pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
+    c: fmi2Component,
+    FMUstate: fmi2FMUstate,
+    size: *mut usize,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes the place of a size, or null.
         let size = unsafe { place(size, "size")? };
@@ -396,13 +448,20 @@ pub unsafe extern "C" fn fmi2SerializedFMUstateSize(c: fmi2Component, FMUstate: 
 
 /// `fmi2SerializeFMUstate`: `size` bytes must hold the state.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializeFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate, serializedState: *mut u8, size: usize) -> Status {
+pub unsafe extern "C" fn fmi2SerializeFMUstate(
+    c: fmi2Component,
+    FMUstate: fmi2FMUstate,
+    serializedState: *mut u8,
+    size: usize,
+) -> Status {
     let body = |i: &mut Instance| {
         let bytes = i.serialize(FMUstate.cast::<Snapshot>())?;
         // SAFETY: the host passes `size` bytes, or null.
         let out = unsafe { slice_mut(serializedState, size, "serializedState")? };
         let have = out.len();
-        let out = out.get_mut(..bytes.len()).ok_or_else(|| error(format!("{have} bytes cannot hold a state of {}", bytes.len())))?;
+        let out = out
+            .get_mut(..bytes.len())
+            .ok_or_else(|| error(format!("{have} bytes cannot hold a state of {}", bytes.len())))?;
         out.copy_from_slice(&bytes);
         Ok(())
     };
@@ -412,10 +471,16 @@ pub unsafe extern "C" fn fmi2SerializeFMUstate(c: fmi2Component, FMUstate: fmi2F
 
 /// `fmi2DeSerializeFMUstate`: of this scene and library, from any process; legal right after instantiation.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DeSerializeFMUstate(c: fmi2Component, serializedState: *const u8, size: usize, FMUstate: *mut fmi2FMUstate) -> Status {
+pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
+    c: fmi2Component,
+    serializedState: *const u8,
+    size: usize,
+    FMUstate: *mut fmi2FMUstate,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes `size` bytes and the place of a state, or null.
-        let (bytes, state) = unsafe { (slice(serializedState, size, "serializedState")?, place(FMUstate, "FMUstate")?) };
+        let (bytes, state) =
+            unsafe { (slice(serializedState, size, "serializedState")?, place(FMUstate, "FMUstate")?) };
         *state = i.deserialize(bytes, state.cast::<Snapshot>())?.cast_mut().cast();
         Ok(())
     };
@@ -427,10 +492,16 @@ pub unsafe extern "C" fn fmi2DeSerializeFMUstate(c: fmi2Component, serializedSta
 
 /// `fmi2DoStep`: exactly to the end of the step, or Discard and no change at all.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint: f64, communicationStepSize: f64, noSetFMUStatePriorToCurrentPoint: fmi2Boolean) -> Status {
+pub unsafe extern "C" fn fmi2DoStep(
+    c: fmi2Component,
+    currentCommunicationPoint: f64,
+    communicationStepSize: f64,
+    noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
+) -> Status {
     let _ = noSetFMUStatePriorToCurrentPoint;
     let body = |i: &mut Instance2| {
-        let status = i.common.answer(table::DO_STEP, modes::ERROR, |i| i.step(currentCommunicationPoint, communicationStepSize));
+        let status =
+            i.common.answer(table::DO_STEP, modes::ERROR, |i| i.step(currentCommunicationPoint, communicationStepSize));
         if status == Status::Discard {
             i.common.mode = modes::STEP_FAILED;
         }
@@ -445,7 +516,12 @@ pub unsafe extern "C" fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint:
 ///
 /// # Safety
 /// As for [`on`]; `value` is null or the host's place for the answer.
-unsafe fn tell<T>(c: fmi2Component, name: &'static str, value: *mut T, answer: impl FnOnce(&Instance2) -> Option<T>) -> Status {
+unsafe fn tell<T>(
+    c: fmi2Component,
+    name: &'static str,
+    value: *mut T,
+    answer: impl FnOnce(&Instance2) -> Option<T>,
+) -> Status {
     let body = |i: &mut Instance2| {
         let told = answer(i);
         i.common.answer(table::status(name), modes::ERROR, |_| {

@@ -81,13 +81,20 @@ pub extern "C" fn fmi3GetVersion() -> *const c_char {
 
 /// `fmi3SetDebugLogging`: no categories means all.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetDebugLogging(instance: fmi3Instance, loggingOn: fmi3Boolean, nCategories: usize, categories: *const *const c_char) -> Status {
+pub unsafe extern "C" fn fmi3SetDebugLogging(
+    instance: fmi3Instance,
+    loggingOn: fmi3Boolean,
+    nCategories: usize,
+    categories: *const *const c_char,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes `nCategories` strings, or null.
         let names = unsafe { slice(categories, nCategories, "categories")? };
         // SAFETY: each of them is a string, or null.
         let names = names.iter().map(|&name| unsafe { text(name) }.unwrap_or(""));
-        i.logger.configure(loggingOn != 0, names).map_err(|name| error(format!("log category `{name}` is not declared")))
+        i.logger
+            .configure(loggingOn != 0, names)
+            .map_err(|name| error(format!("log category `{name}` is not declared")))
     };
     // SAFETY: the host's promise about its instance.
     unsafe { on(instance, table::SET_DEBUG_LOGGING, body) }
@@ -105,7 +112,12 @@ pub unsafe extern "C" fn fmi3InstantiateModelExchange(
     logMessage: Option<LogMessage3>,
 ) -> fmi3Instance {
     let _ = (instanceName, instantiationToken, resourcePath, visible);
-    refuse_instance(logMessage, instanceEnvironment, loggingOn, "fmi3InstantiateModelExchange: this component offers co-simulation only")
+    refuse_instance(
+        logMessage,
+        instanceEnvironment,
+        loggingOn,
+        "fmi3InstantiateModelExchange: this component offers co-simulation only",
+    )
 }
 
 /// `fmi3InstantiateCoSimulation`: null and a line in the log if name, token or scene are not as they should be.
@@ -124,7 +136,13 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     logMessage: Option<LogMessage3>,
     intermediateUpdate: *const c_void,
 ) -> fmi3Instance {
-    let _ = (visible, earlyReturnAllowed, requiredIntermediateVariables, nRequiredIntermediateVariables, intermediateUpdate);
+    let _ = (
+        visible,
+        earlyReturnAllowed,
+        requiredIntermediateVariables,
+        nRequiredIntermediateVariables,
+        intermediateUpdate,
+    );
     let opened = guard::caught(|| {
         let logger = Logger::new(logMessage.map_or(Callback::None, Callback::V3), instanceEnvironment, loggingOn != 0);
         let fail = |logger: Logger, why: &str| {
@@ -148,7 +166,14 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
             Err((logger, why)) => fail(logger, &why),
         }
     });
-    opened.unwrap_or_else(|why| refuse_instance(logMessage, instanceEnvironment, loggingOn, &format!("fmi3InstantiateCoSimulation: internal failure: {why}")))
+    opened.unwrap_or_else(|why| {
+        refuse_instance(
+            logMessage,
+            instanceEnvironment,
+            loggingOn,
+            &format!("fmi3InstantiateCoSimulation: internal failure: {why}"),
+        )
+    })
 }
 
 /// `fmi3InstantiateScheduledExecution`: not offered, returns null.
@@ -166,11 +191,22 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
     unlockPreemption: *const c_void,
 ) -> fmi3Instance {
     let _ = (instanceName, instantiationToken, resourcePath, visible, clockUpdate, lockPreemption, unlockPreemption);
-    refuse_instance(logMessage, instanceEnvironment, loggingOn, "fmi3InstantiateScheduledExecution: this component offers co-simulation only")
+    refuse_instance(
+        logMessage,
+        instanceEnvironment,
+        loggingOn,
+        "fmi3InstantiateScheduledExecution: this component offers co-simulation only",
+    )
 }
 
 fn refuse_instance(log: Option<LogMessage3>, environment: *mut c_void, on: fmi3Boolean, why: &str) -> fmi3Instance {
-    let told = guard::caught(|| Logger::new(log.map_or(Callback::None, Callback::V3), environment, on != 0).log(Status::Error, Category::Error, why));
+    let told = guard::caught(|| {
+        Logger::new(log.map_or(Callback::None, Callback::V3), environment, on != 0).log(
+            Status::Error,
+            Category::Error,
+            why,
+        )
+    });
     let _ = told;
     std::ptr::null_mut()
 }
@@ -195,7 +231,11 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
     stopTime: f64,
 ) -> Status {
     let body = |i: &mut Instance| {
-        i.set_experiment((toleranceDefined != 0).then_some(tolerance), startTime, (stopTimeDefined != 0).then_some(stopTime))?;
+        i.set_experiment(
+            (toleranceDefined != 0).then_some(tolerance),
+            startTime,
+            (stopTimeDefined != 0).then_some(stopTime),
+        )?;
         i.enter_initialization()
     };
     // SAFETY: the host's promise about its instance.
@@ -224,7 +264,11 @@ pub unsafe extern "C" fn fmi3Terminate(instance: fmi3Instance) -> Status {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3Reset(instance: fmi3Instance) -> Status {
     let body = |i: &mut Instance3| {
-        if i.0.is_poisoned() { reset_poisoned(&mut i.0) } else { i.0.answer(table::RESET, modes::ERROR, Instance::reset) }
+        if i.0.is_poisoned() {
+            reset_poisoned(&mut i.0)
+        } else {
+            i.0.answer(table::RESET, modes::ERROR, Instance::reset)
+        }
     };
     // SAFETY: the host's promise about its instance.
     unsafe { guard::with(instance.cast::<Handle<Instance3>>(), body) }.unwrap_or(Status::Error)
@@ -242,10 +286,18 @@ pub(super) fn reset_poisoned(instance: &mut Instance) -> Status {
 
 /// `fmi3GetFloat64`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFloat64(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *mut f64, nValues: usize) -> Status {
+pub unsafe extern "C" fn fmi3GetFloat64(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    values: *mut f64,
+    nValues: usize,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of these lengths, or null.
-        let (references, out) = unsafe { (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?) };
+        let (references, out) = unsafe {
+            (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
+        };
         check_lengths(i, references, Type::Float64, out.len())?;
         let mut rest = out;
         for &reference in references {
@@ -263,10 +315,18 @@ pub unsafe extern "C" fn fmi3GetFloat64(instance: fmi3Instance, valueReferences:
 
 /// `fmi3GetInt32`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetInt32(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *mut i32, nValues: usize) -> Status {
+pub unsafe extern "C" fn fmi3GetInt32(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    values: *mut i32,
+    nValues: usize,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of these lengths, or null.
-        let (references, out) = unsafe { (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?) };
+        let (references, out) = unsafe {
+            (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
+        };
         check_lengths(i, references, Type::Int32, out.len())?;
         let mut rest = out;
         for &reference in references {
@@ -284,10 +344,18 @@ pub unsafe extern "C" fn fmi3GetInt32(instance: fmi3Instance, valueReferences: *
 
 /// `fmi3GetBoolean`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetBoolean(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *mut fmi3Boolean, nValues: usize) -> Status {
+pub unsafe extern "C" fn fmi3GetBoolean(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    values: *mut fmi3Boolean,
+    nValues: usize,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of these lengths, or null.
-        let (references, out) = unsafe { (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?) };
+        let (references, out) = unsafe {
+            (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
+        };
         check_lengths(i, references, Type::Boolean, out.len())?;
         let mut k = 0;
         for &reference in references {
@@ -306,10 +374,18 @@ pub unsafe extern "C" fn fmi3GetBoolean(instance: fmi3Instance, valueReferences:
 
 /// `fmi3SetFloat64`: checked as a whole, then written as a whole; nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFloat64(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *const f64, nValues: usize) -> Status {
+pub unsafe extern "C" fn fmi3SetFloat64(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    values: *const f64,
+    nValues: usize,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of these lengths, or null.
-        let (references, values) = unsafe { (slice(valueReferences, nValueReferences, "valueReferences")?, slice(values, nValues, "values")?) };
+        let (references, values) = unsafe {
+            (slice(valueReferences, nValueReferences, "valueReferences")?, slice(values, nValues, "values")?)
+        };
         check_lengths(i, references, Type::Float64, values.len())?;
         let mut rest = values;
         for &reference in references {
@@ -333,7 +409,13 @@ pub unsafe extern "C" fn fmi3SetFloat64(instance: fmi3Instance, valueReferences:
 
 /// `fmi3SetInt32`: no variable of this type can be set.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetInt32(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *const i32, nValues: usize) -> Status {
+pub unsafe extern "C" fn fmi3SetInt32(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    values: *const i32,
+    nValues: usize,
+) -> Status {
     let _ = (valueReferences, values);
     // SAFETY: the host's promise about its instance.
     unsafe { on(instance, table::set("fmi3SetInt32"), |_| nothing_settable(nValueReferences, nValues)) }
@@ -341,7 +423,13 @@ pub unsafe extern "C" fn fmi3SetInt32(instance: fmi3Instance, valueReferences: *
 
 /// `fmi3SetBoolean`: no variable of this type can be set.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetBoolean(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *const fmi3Boolean, nValues: usize) -> Status {
+pub unsafe extern "C" fn fmi3SetBoolean(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    values: *const fmi3Boolean,
+    nValues: usize,
+) -> Status {
     let _ = (valueReferences, values);
     // SAFETY: the host's promise about its instance.
     unsafe { on(instance, table::set("fmi3SetBoolean"), |_| nothing_settable(nValueReferences, nValues)) }
@@ -357,7 +445,11 @@ fn check_lengths(instance: &Instance, references: &[u32], ty: Type, n_values: us
     for &reference in references {
         wanted += instance.port(reference, ty)?.1.len();
     }
-    if wanted == n_values { Ok(()) } else { Err(error(format!("nValues is {n_values}, but the variables hold {wanted}"))) }
+    if wanted == n_values {
+        Ok(())
+    } else {
+        Err(error(format!("nValues is {n_values}, but the variables hold {wanted}")))
+    }
 }
 
 no_variable_of_type! {
@@ -422,7 +514,11 @@ pub unsafe extern "C" fn fmi3FreeFMUState(instance: fmi3Instance, FMUState: *mut
 
 /// `fmi3SerializedFMUStateSize`, bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializedFMUStateSize(instance: fmi3Instance, FMUState: fmi3FMUState, size: *mut usize) -> Status {
+pub unsafe extern "C" fn fmi3SerializedFMUStateSize(
+    instance: fmi3Instance,
+    FMUState: fmi3FMUState,
+    size: *mut usize,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes the place of a size, or null.
         let size = unsafe { place(size, "size")? };
@@ -435,13 +531,20 @@ pub unsafe extern "C" fn fmi3SerializedFMUStateSize(instance: fmi3Instance, FMUS
 
 /// `fmi3SerializeFMUState`: `size` bytes must hold the state.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializeFMUState(instance: fmi3Instance, FMUState: fmi3FMUState, serializedState: *mut u8, size: usize) -> Status {
+pub unsafe extern "C" fn fmi3SerializeFMUState(
+    instance: fmi3Instance,
+    FMUState: fmi3FMUState,
+    serializedState: *mut u8,
+    size: usize,
+) -> Status {
     let body = |i: &mut Instance| {
         let bytes = i.serialize(FMUState.cast::<Snapshot>())?;
         // SAFETY: the host passes `size` bytes, or null.
         let out = unsafe { slice_mut(serializedState, size, "serializedState")? };
         let have = out.len();
-        let out = out.get_mut(..bytes.len()).ok_or_else(|| error(format!("{have} bytes cannot hold a state of {}", bytes.len())))?;
+        let out = out
+            .get_mut(..bytes.len())
+            .ok_or_else(|| error(format!("{have} bytes cannot hold a state of {}", bytes.len())))?;
         out.copy_from_slice(&bytes);
         Ok(())
     };
@@ -451,10 +554,16 @@ pub unsafe extern "C" fn fmi3SerializeFMUState(instance: fmi3Instance, FMUState:
 
 /// `fmi3DeserializeFMUState`: of this scene and library, from any process; legal right after instantiation.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3DeserializeFMUState(instance: fmi3Instance, serializedState: *const u8, size: usize, FMUState: *mut fmi3FMUState) -> Status {
+pub unsafe extern "C" fn fmi3DeserializeFMUState(
+    instance: fmi3Instance,
+    serializedState: *const u8,
+    size: usize,
+    FMUState: *mut fmi3FMUState,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes `size` bytes and the place of a state, or null.
-        let (bytes, state) = unsafe { (slice(serializedState, size, "serializedState")?, place(FMUState, "FMUState")?) };
+        let (bytes, state) =
+            unsafe { (slice(serializedState, size, "serializedState")?, place(FMUState, "FMUState")?) };
         *state = i.deserialize(bytes, state.cast::<Snapshot>())?.cast_mut().cast();
         Ok(())
     };
@@ -517,7 +626,9 @@ pub unsafe extern "C" fn fmi3DoStep(
     }
     let body = |i: &mut Instance3| {
         let status = i.0.answer(table::DO_STEP, modes::ERROR, |i| {
-            if [eventHandlingNeeded, terminateSimulation, earlyReturn].iter().any(|p| p.is_null()) || lastSuccessfulTime.is_null() {
+            if [eventHandlingNeeded, terminateSimulation, earlyReturn].iter().any(|p| p.is_null())
+                || lastSuccessfulTime.is_null()
+            {
                 return Err(error("an output argument is NULL"));
             }
             i.step(currentCommunicationPoint, communicationStepSize)

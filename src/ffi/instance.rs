@@ -11,7 +11,7 @@ use super::modes::{self, Call, Mode};
 use super::resources;
 use super::snapshot::Snapshot;
 use crate::port::{Causality, Port, Type};
-use crate::sim::{Sim, StepReport};
+use crate::sim::{Sim, SimError, StepReport};
 
 /// Communication points may differ from the instance's time by this, relative to the larger of time and step: ten
 /// steps of 0.1 add up to 0.9999999999999999.
@@ -61,7 +61,10 @@ impl Instance {
             Err(why) => return Err((logger, chain(&why))),
         };
         if model.token() != token {
-            let why = format!("the token is `{token}`, but the scene at hand has `{}`: the description is of another scene or version", model.token());
+            let why = format!(
+                "the token is `{token}`, but the scene at hand has `{}`: the description is of another scene or version",
+                model.token()
+            );
             return Err((logger, why));
         }
         match Sim::new(Arc::new(model)) {
@@ -128,14 +131,31 @@ impl Instance {
         Ok(())
     }
 
-    /// Finds the equilibrium of the start values if one of them moved since the last time.
+    /// Finds the equilibrium of the start values if one of them moved since the last time. It is sought from rest each
+    /// time, so that a host which looks at outputs in between gets the same bits as one which does not.
     fn refresh(&mut self) -> Answer {
         if self.mode == modes::INITIALIZATION && self.stale {
+            self.back_to_rest().map_err(|why| error(chain(&why)))?;
             let report = self.sim.initialise().map_err(|why| error(chain(&why)))?;
             self.tell("initial equilibrium", &report);
             self.stale = false;
         }
         Ok(())
+    }
+
+    /// As after instantiation, but for time, inputs and parameters.
+    fn back_to_rest(&mut self) -> Result<(), SimError> {
+        let model = self.sim.model().clone();
+        let mut kept = Vec::new();
+        for (i, port) in model.ports().iter().enumerate().filter(|(_, p)| p.is_settable()) {
+            let mut values = vec![0.0; port.len()];
+            self.sim.get_f64(i, 0, &mut values)?;
+            kept.push((i, values));
+        }
+        let t = self.sim.time();
+        self.sim.reset();
+        self.sim.set_time(t);
+        kept.iter().try_for_each(|(i, values)| self.sim.set_f64(*i, 0, values))
     }
 
     /// Advances from `at` by `dt`, s. A step that fails leaves everything as it was and is a Discard.
@@ -162,7 +182,12 @@ impl Instance {
             self.logger.log(Status::Warning, Category::Warning, warning);
         }
         if self.logger.hears(Status::Ok, Category::NonlinearSystems) {
-            let text = format!("{what} to t = {} s: {} iterations, residual {:.2e} N", self.sim.time(), report.iterations, report.residual);
+            let text = format!(
+                "{what} to t = {} s: {} iterations, residual {:.2e} N",
+                self.sim.time(),
+                report.iterations,
+                report.residual
+            );
             self.logger.log(Status::Ok, Category::NonlinearSystems, &text);
         }
     }
@@ -195,7 +220,11 @@ impl Instance {
     /// The port that a host means by an FMI 3.0 value reference.
     pub(super) fn port(&self, reference: u32, ty: Type) -> Result<(usize, &Port), Refusal> {
         let ports = self.sim.model().ports();
-        let found = ports.binary_search_by_key(&reference, |p| p.reference).ok().map(|i| (i, &ports[i])).filter(|(_, p)| !p.is_empty());
+        let found = ports
+            .binary_search_by_key(&reference, |p| p.reference)
+            .ok()
+            .map(|i| (i, &ports[i]))
+            .filter(|(_, p)| !p.is_empty());
         let (i, port) = found.ok_or_else(|| error(format!("no variable has value reference {reference}")))?;
         if port.ty != ty {
             return Err(error(format!("`{}` (value reference {reference}) is {:?}, not {ty:?}", port.name, port.ty)));
@@ -206,7 +235,10 @@ impl Instance {
     /// Brings outputs up to date where the standard wants it: in Initialization Mode, when `port` is computed from
     /// values that were set meanwhile. Between steps nothing is ever solved here.
     pub(super) fn before_get(&mut self, port: usize) -> Answer {
-        if self.stale && self.mode == modes::INITIALIZATION && self.sim.model().ports()[port].causality == Causality::Output {
+        if self.stale
+            && self.mode == modes::INITIALIZATION
+            && self.sim.model().ports()[port].causality == Causality::Output
+        {
             return self.refresh();
         }
         Ok(())
@@ -220,14 +252,27 @@ impl Instance {
             Causality::Independent | Causality::Output | Causality::CalculatedParameter => 0,
         };
         if legal & self.mode == 0 {
-            return Err(error(format!("`{}` ({:?}) cannot be set in {}", port.name, port.causality, modes::name(self.mode))));
+            return Err(error(format!(
+                "`{}` ({:?}) cannot be set in {}",
+                port.name,
+                port.causality,
+                modes::name(self.mode)
+            )));
         }
-        let wrong = values.iter().position(|&v| !v.is_finite() || port.min.is_some_and(|min| v < min) || port.max.is_some_and(|max| v > max));
+        let wrong = values.iter().position(|&v| {
+            !v.is_finite() || port.min.is_some_and(|min| v < min) || port.max.is_some_and(|max| v > max)
+        });
         match wrong {
             None => Ok(()),
             Some(k) => {
                 let (min, max) = (port.min.unwrap_or(f64::NEG_INFINITY), port.max.unwrap_or(f64::INFINITY));
-                Err(error(format!("element {} of `{}` was set to {} {}, wanted a finite value from {min} to {max}", offset + k, port.name, values[k], port.unit)))
+                Err(error(format!(
+                    "element {} of `{}` was set to {} {}, wanted a finite value from {min} to {max}",
+                    offset + k,
+                    port.name,
+                    values[k],
+                    port.unit
+                )))
             }
         }
     }
@@ -277,7 +322,10 @@ impl Instance {
 
     fn find(&self, state: *const Snapshot) -> Result<usize, Refusal> {
         let known = |kept: &Box<Snapshot>| std::ptr::eq::<Snapshot>(&raw const **kept, state);
-        self.states.iter().position(known).ok_or_else(|| error("the FMU state is none of this instance (a new one starts from NULL)"))
+        self.states
+            .iter()
+            .position(known)
+            .ok_or_else(|| error("the FMU state is none of this instance (a new one starts from NULL)"))
     }
 
     /// Goes back to a saved state: values, outputs, time and mode.

@@ -89,7 +89,8 @@ impl Logger {
             return;
         }
         let name = CString::new(LOG_CATEGORIES[category as usize].0).expect("category names hold no zero byte");
-        let text = CString::new(message.trim_end().replace('\0', " ").replace('#', "##")).expect("zero bytes were replaced");
+        let text =
+            CString::new(message.trim_end().replace('\0', " ").replace('#', "##")).expect("zero bytes were replaced");
         match &self.callback {
             Callback::None => {}
             Callback::V3(log) => {
@@ -99,7 +100,14 @@ impl Logger {
             Callback::V2 { logger, instance_name } => {
                 // SAFETY: as above; the format is ours and takes exactly one string.
                 unsafe {
-                    logger(self.environment, instance_name.as_ptr(), status, name.as_ptr(), c"%s".as_ptr(), text.as_ptr());
+                    logger(
+                        self.environment,
+                        instance_name.as_ptr(),
+                        status,
+                        name.as_ptr(),
+                        c"%s".as_ptr(),
+                        text.as_ptr(),
+                    );
                 }
             }
         }

@@ -15,6 +15,8 @@
 pub mod capi;
 pub mod fmi2;
 pub mod fmi3;
+#[cfg(unix)]
+pub mod host;
 
 mod guard;
 mod instance;

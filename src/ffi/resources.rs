@@ -28,7 +28,11 @@ pub(super) fn model(folder: Option<&Path>) -> Result<Model, Error> {
 pub(super) fn path_of_uri(uri: &str) -> Result<PathBuf, String> {
     let Some(rest) = strip_scheme(uri) else {
         let plain = PathBuf::from(uri);
-        return if plain.is_absolute() { Ok(plain) } else { Err(format!("`{uri}` is no file URI: wanted file:///folder")) };
+        return if plain.is_absolute() {
+            Ok(plain)
+        } else {
+            Err(format!("`{uri}` is no file URI: wanted file:///folder"))
+        };
     };
     let path = match rest.strip_prefix("//") {
         Some(authority_and_path) => {
@@ -74,12 +78,23 @@ mod tests {
 
     #[test]
     fn every_spelling_of_a_file_uri() {
-        for uri in ["file:///tmp/a b", "file:/tmp/a%20b", "file://localhost/tmp/a%20b", "FILE:///tmp/a%20b", "/tmp/a b"] {
+        for uri in ["file:///tmp/a b", "file:/tmp/a%20b", "file://localhost/tmp/a%20b", "FILE:///tmp/a%20b", "/tmp/a b"]
+        {
             assert_eq!(path_of_uri(uri).unwrap(), PathBuf::from("/tmp/a b"), "{uri}");
         }
         assert_eq!(path_of_uri("file:///tmp/%C3%A9/").unwrap(), PathBuf::from("/tmp/\u{e9}/"));
         assert_eq!(path_of_uri("file:///C:/fmu").unwrap(), PathBuf::from("C:/fmu"));
-        for bad in ["", "http://x/y", "file://host/y", "file:///a%2", "file:///a%zz", "file:///%ff", "file:///%00", "relative", "file://x"] {
+        for bad in [
+            "",
+            "http://x/y",
+            "file://host/y",
+            "file:///a%2",
+            "file:///a%zz",
+            "file:///%ff",
+            "file:///%00",
+            "relative",
+            "file://x",
+        ] {
             assert!(path_of_uri(bad).is_err(), "{bad}");
         }
     }

@@ -50,7 +50,10 @@ impl Snapshot {
     /// # Errors
     /// What is wrong with the bytes, in words.
     pub(super) fn from_bytes(bytes: &[u8], model: &Model) -> Result<Self, String> {
-        let body = bytes.len().checked_sub(CHECKSUM).ok_or_else(|| format!("{} bytes are too few for a saved state", bytes.len()))?;
+        let body = bytes
+            .len()
+            .checked_sub(CHECKSUM)
+            .ok_or_else(|| format!("{} bytes are too few for a saved state", bytes.len()))?;
         let (body, checksum) = bytes.split_at(body);
         let mut reader = Reader(body);
         if reader.take(MAGIC.len())? != MAGIC {

@@ -43,7 +43,11 @@ pub fn description(model: &Model, version: FmiVersion) -> String {
                 empty(xml, "Category", vec![("name", name.to_owned()), ("description", what.to_owned())]);
             }
         });
-        empty(xml, "DefaultExperiment", vec![("startTime", "0".to_owned()), ("stopTime", STOP_TIME.to_owned()), ("stepSize", STEP_SIZE.to_owned())]);
+        empty(
+            xml,
+            "DefaultExperiment",
+            vec![("startTime", "0".to_owned()), ("stopTime", STOP_TIME.to_owned()), ("stepSize", STEP_SIZE.to_owned())],
+        );
         match version {
             FmiVersion::V3 => {
                 element(xml, "ModelVariables", vec![], |xml| ports.iter().for_each(|p| variable3(xml, p, &types)));
@@ -70,7 +74,11 @@ pub fn terminals(model: &Model) -> String {
             for (group, members) in groups {
                 element(xml, "Terminal", vec![("name", group.to_owned()), ("matchingRule", "bus".to_owned())], |xml| {
                     for (member, port) in members {
-                        let attributes = vec![("variableName", port.name.clone()), ("memberName", member.to_owned()), ("variableKind", "signal".to_owned())];
+                        let attributes = vec![
+                            ("variableName", port.name.clone()),
+                            ("memberName", member.to_owned()),
+                            ("variableKind", "signal".to_owned()),
+                        ];
                         empty(xml, "TerminalMemberVariable", attributes);
                     }
                 });
@@ -187,7 +195,9 @@ impl Types {
                         attributes.insert(0, ("name", definition.name.clone()));
                         empty(xml, "Float64Type", attributes);
                     }
-                    FmiVersion::V2 => element(xml, "SimpleType", vec![("name", definition.name.clone())], |xml| empty(xml, "Real", attributes)),
+                    FmiVersion::V2 => element(xml, "SimpleType", vec![("name", definition.name.clone())], |xml| {
+                        empty(xml, "Real", attributes)
+                    }),
                 }
             }
         });
@@ -258,7 +268,10 @@ fn variables2(xml: &mut Xml, port: &Port, types: &Types) {
     let columns: usize = port.shape.get(1..).map_or(1, |rest| rest.iter().product());
     for k in 0..port.len() {
         let row = port.rows.get(k / columns).filter(|_| !port.shape.is_empty());
-        let description = row.map_or_else(|| port.description.clone(), |row| format!("{} ({row})", port.description.trim_end_matches('.')));
+        let description = row.map_or_else(
+            || port.description.clone(),
+            |row| format!("{} ({row})", port.description.trim_end_matches('.')),
+        );
         let mut attributes: Attributes = vec![
             ("name", scalar_name(port, k)),
             ("valueReference", scalar_reference(port, k).to_string()),
@@ -290,18 +303,27 @@ fn variables2(xml: &mut Xml, port: &Port, types: &Types) {
 /// Outputs depend on every input, and in the beginning on the parameters too: a body in equilibrium feels all of them.
 fn structure3(xml: &mut Xml, ports: &[&Port]) {
     let references = |wanted: &[Causality]| -> String {
-        let found: Vec<String> = ports.iter().filter(|p| wanted.contains(&p.causality)).map(|p| p.reference.to_string()).collect();
+        let found: Vec<String> =
+            ports.iter().filter(|p| wanted.contains(&p.causality)).map(|p| p.reference.to_string()).collect();
         found.join(" ")
     };
     let inputs = references(&[Causality::Input]);
     let knowns = references(&[Causality::Input, Causality::Parameter]);
     element(xml, "ModelStructure", vec![], |xml| {
         for port in ports.iter().filter(|p| p.causality == Causality::Output) {
-            empty(xml, "Output", vec![("valueReference", port.reference.to_string()), ("dependencies", inputs.clone())]);
+            empty(
+                xml,
+                "Output",
+                vec![("valueReference", port.reference.to_string()), ("dependencies", inputs.clone())],
+            );
         }
         for port in ports.iter().filter(|p| is_calculated(p)) {
             let dependencies = if port.causality == Causality::Output { knowns.clone() } else { String::new() };
-            empty(xml, "InitialUnknown", vec![("valueReference", port.reference.to_string()), ("dependencies", dependencies)]);
+            empty(
+                xml,
+                "InitialUnknown",
+                vec![("valueReference", port.reference.to_string()), ("dependencies", dependencies)],
+            );
         }
     });
 }
@@ -355,5 +377,9 @@ fn element(xml: &mut Xml, name: &'static str, attributes: Attributes, body: impl
 
 fn empty(xml: &mut Xml, name: &'static str, attributes: Attributes) {
     let attributes = attributes.iter().map(|(key, value)| (*key, value.as_str()));
-    xml.create_element(name).with_attributes(attributes).write_empty().map(drop).expect("writing to memory does not fail");
+    xml.create_element(name)
+        .with_attributes(attributes)
+        .write_empty()
+        .map(drop)
+        .expect("writing to memory does not fail");
 }

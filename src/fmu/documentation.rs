@@ -50,5 +50,9 @@ fn shape(port: &Port) -> String {
 }
 
 fn about(port: &Port) -> String {
-    if port.rows.is_empty() { port.description.clone() } else { format!("{} Rows: {}.", port.description, port.rows.join(", ")) }
+    if port.rows.is_empty() {
+        port.description.clone()
+    } else {
+        format!("{} Rows: {}.", port.description, port.rows.join(", "))
+    }
 }

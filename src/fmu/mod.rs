@@ -66,7 +66,11 @@ const ELEMENT_BITS: u32 = 20;
 /// # Panics
 /// If port reference or offset do not fit: 4096 references, 1048576 elements.
 pub fn scalar_reference(port: &Port, offset: usize) -> u32 {
-    assert!(offset < 1 << ELEMENT_BITS && port.reference < 1 << (32 - ELEMENT_BITS), "`{}` does not fit FMI 2.0 references", port.name);
+    assert!(
+        offset < 1 << ELEMENT_BITS && port.reference < 1 << (32 - ELEMENT_BITS),
+        "`{}` does not fit FMI 2.0 references",
+        port.name
+    );
     (port.reference << ELEMENT_BITS) + offset as u32
 }
 
@@ -97,7 +101,8 @@ pub fn scalar_name(port: &Port, offset: usize) -> String {
 /// Whether the FMI 2.0 archive has this port. The skin arrays stay out: one scalar for each coordinate makes importers
 /// crawl, and markers tell what a host without arrays can use.
 pub fn in_fmi2(port: &Port) -> bool {
-    let skin = matches!(port.slot, Slot::SkinPosition | Slot::SkinVelocity | Slot::SkinRestPosition | Slot::SkinTriangles);
+    let skin =
+        matches!(port.slot, Slot::SkinPosition | Slot::SkinVelocity | Slot::SkinRestPosition | Slot::SkinTriangles);
     !skin && !port.is_empty() && port.len() <= 1 << ELEMENT_BITS && port.reference < 1 << (32 - ELEMENT_BITS)
 }
 
