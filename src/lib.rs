@@ -8,11 +8,15 @@
 pub mod bytes;
 pub mod effect;
 pub mod energy;
+pub mod error;
 pub mod fem;
 pub mod geometry;
 pub mod io;
+pub mod load;
 pub mod math;
 pub mod mesh;
 pub mod port;
+pub mod scene;
 pub mod sim;
 pub mod solve;
+pub mod view;

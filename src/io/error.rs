@@ -81,6 +81,56 @@ pub enum IoError {
         /// The file.
         path: PathBuf,
     },
+    /// Not a CT.
+    #[error("{}: modality {found}, wanted CT: Hounsfield thresholds mean nothing elsewhere; export the CT series", path.display())]
+    Modality {
+        /// The file.
+        path: PathBuf,
+        /// Modality found.
+        found: String,
+    },
+    /// The slices are sheared against their stacking direction.
+    #[error("{}: the slices are sheared by {degrees:.2} degrees (gantry tilt); resample to an untilted grid first", path.display())]
+    GantryTilt {
+        /// The series.
+        path: PathBuf,
+        /// Angle between the stacking direction and the slice normal.
+        degrees: f64,
+    },
+    /// A series with holes.
+    #[error("{}: {missing} slice(s) missing, the first between z = {after_mm:.2} and {before_mm:.2} mm at {spacing_mm:.3} mm spacing; export the whole series", path.display())]
+    MissingSlices {
+        /// The series.
+        path: PathBuf,
+        /// How many are missing.
+        missing: usize,
+        /// Position of the slice before the first hole, mm along the normal.
+        after_mm: f64,
+        /// Position of the slice after it, mm.
+        before_mm: f64,
+        /// Usual distance of slices, mm.
+        spacing_mm: f64,
+    },
+    /// Slices at uneven distances.
+    #[error("{}: slice distances range from {least_mm:.3} to {most_mm:.3} mm; resample to uniform spacing, or pick one series", path.display())]
+    Spacing {
+        /// The series.
+        path: PathBuf,
+        /// Smallest distance, mm.
+        least_mm: f64,
+        /// Largest distance, mm.
+        most_mm: f64,
+    },
+    /// Several series in one folder.
+    #[error("{}: {found} series are mixed here ({list}); put one series in a folder of its own", path.display())]
+    MixedSeries {
+        /// The folder.
+        path: PathBuf,
+        /// Number of series.
+        found: usize,
+        /// Each series and its number of files.
+        list: String,
+    },
     /// The file is sound but its mesh breaks a rule.
     #[error("{}: {source}", path.display())]
     Mesh {

@@ -2,13 +2,18 @@
 #![forbid(unsafe_code)]
 
 mod baked;
+mod ct;
+mod dicom;
 mod error;
 mod gmsh;
 mod mesh;
+mod nifti;
+mod nrrd;
 mod text;
 mod vtk;
 
 pub use baked::{decode, encode};
+pub use ct::{read_labels, read_volume};
 pub use error::IoError;
 pub use mesh::{read_mesh, write_mesh};
 pub use vtk::{Data, write_pvd, write_vtu};

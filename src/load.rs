@@ -1,0 +1,132 @@
+//! From a scene file to a model: finds or makes the mesh, then builds.
+#![forbid(unsafe_code)]
+
+use std::path::{Path, PathBuf};
+
+use crate::error::Error;
+use crate::geometry::{Block, Pattern, block};
+use crate::io;
+use crate::mesh::TetMesh;
+use crate::scene::{MeshSource, Programme, SceneError, SceneFile, build};
+use crate::sim::Model;
+
+/// The scene that stands in the library itself: the synthetic head.
+pub const DEFAULT_SCENE: &str = include_str!("../fmu/scene.toml");
+
+/// Name of the mesh file beside a packed scene.
+pub const BAKED_NAME: &str = "model.cutis";
+
+/// A model and the programme its scene gives it.
+pub struct Loaded {
+    /// The model.
+    pub model: Model,
+    /// The programme of `cutis run`.
+    pub programme: Programme,
+}
+
+/// A scene made self-contained: its text reads the mesh from [`BAKED_NAME`], whose bytes are here.
+pub struct Baked {
+    /// Scene text.
+    pub scene: String,
+    /// Bytes of the baked mesh.
+    pub mesh: Vec<u8>,
+}
+
+/// Loads `scene`; files it names are relative to its folder.
+///
+/// # Errors
+/// [`Error`].
+pub fn from_file(scene: &Path) -> Result<Loaded, Error> {
+    let text = read(scene)?;
+    load(&text, scene, scene.parent())
+}
+
+/// Loads a scene from its text; files it names are relative to `folder` (the working directory if `None`).
+///
+/// # Errors
+/// [`Error`].
+pub fn from_text(text: &str, folder: Option<&Path>) -> Result<Loaded, Error> {
+    load(text, Path::new("<text>"), folder)
+}
+
+/// Loads the default scene.
+///
+/// # Errors
+/// [`Error`]; none as long as the tests pass.
+pub fn embedded() -> Result<Loaded, Error> {
+    load(DEFAULT_SCENE, Path::new("<default scene>"), None)
+}
+
+/// Makes `scene` self-contained.
+///
+/// # Errors
+/// [`Error`].
+pub fn baked(scene: &Path) -> Result<Baked, Error> {
+    let text = read(scene)?;
+    baked_text(&text, scene, scene.parent())
+}
+
+/// Makes the default scene self-contained.
+///
+/// # Errors
+/// [`Error`]; none as long as the tests pass.
+pub fn baked_default() -> Result<Baked, Error> {
+    baked_text(DEFAULT_SCENE, Path::new("<default scene>"), None)
+}
+
+fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, Error> {
+    let file = parse(text, path)?;
+    let mesh = mesh_of(text, &file, path, folder)?;
+    let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n"));
+    Ok(Baked { scene: replaced, mesh: io::encode(&mesh) })
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    std::fs::read_to_string(path).map_err(|source| Error::File { path: path.into(), source })
+}
+
+fn scene_error(path: &Path, source: SceneError) -> Error {
+    Error::Scene { path: path.into(), source: Box::new(source) }
+}
+
+fn parse(text: &str, path: &Path) -> Result<SceneFile, Error> {
+    SceneFile::parse(text).map_err(|e| scene_error(path, e))
+}
+
+fn load(text: &str, path: &Path, folder: Option<&Path>) -> Result<Loaded, Error> {
+    let file = parse(text, path)?;
+    let mesh = mesh_of(text, &file, path, folder)?;
+    let (model, programme) = build(text, &file, mesh).map_err(|e| scene_error(path, e))?;
+    Ok(Loaded { model, programme })
+}
+
+fn mesh_of(text: &str, file: &SceneFile, path: &Path, folder: Option<&Path>) -> Result<TetMesh, Error> {
+    Ok(match file.mesh_source(text).map_err(|e| scene_error(path, e))? {
+        MeshSource::File(name) => io::read_mesh(&folder.map_or_else(|| PathBuf::from(&name), |f| f.join(&name)))?,
+        MeshSource::Block { origin, size, cells, forty_eight, layers } => {
+            let pattern = if forty_eight { Pattern::FortyEight } else { Pattern::Six };
+            block(&Block { origin, size, cells, pattern, layers })?
+        }
+        MeshSource::Head { .. } => todo!(),
+    })
+}
+
+/// `text` with its `[mesh...]` tables replaced; the new table stands where the first one stood.
+fn replace_mesh_table(text: &str, table: &str) -> String {
+    let mut out = String::new();
+    let (mut inside, mut written) = (false, false);
+    for line in text.lines() {
+        if line.trim_start().starts_with('[') {
+            inside = line.trim_start().trim_start_matches('[').trim_start().starts_with("mesh");
+            if inside && !written {
+                out += table;
+                written = true;
+            }
+        }
+        if !inside {
+            out += line;
+            out.push('\n');
+        }
+    }
+    out
+}

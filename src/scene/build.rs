@@ -1,0 +1,397 @@
+//! What a scene means: names become sets, keys become terms, and a [`Model`] comes out.
+
+use super::SceneError;
+use super::check::Text;
+use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile};
+use super::place::{area_shares, nearest_point, patch, volume_shares};
+use super::programme::{Programme, Track};
+use crate::effect::{DeadLoad, Elastic, Gravity, Inertia, Pressure, elastic_tissue, lumped_masses};
+use crate::fem::Term;
+use crate::math::Vec3;
+use crate::mesh::{SKIN, TetMesh};
+use crate::port::{Causality, Port, Slot};
+use crate::sim::{self, Bone, Drive, Layout, Marker, Model, ModelParts};
+use crate::solve::Strategy;
+
+/// Above this Poisson's ratio linear tetrahedra lock visibly.
+const LOCKING_NU: f64 = 0.45;
+/// Pairs that the quasi-Newton method remembers.
+const MEMORY: usize = 8;
+/// Iterations after which the quasi-Newton method factors anew.
+const REFRESH_AFTER: u32 = 20;
+
+/// The model and programme of a scene `text` on its mesh.
+///
+/// # Errors
+/// [`SceneError`] with line and column.
+pub fn build(text: &str, file: &SceneFile, mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
+    Builder { text: Text(text) }.build(file, mesh)
+}
+
+struct Builder<'a> {
+    text: Text<'a>,
+}
+
+impl Builder<'_> {
+    fn build(&self, file: &SceneFile, mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
+        // Exhaustive, so that a new table cannot be forgotten here.
+        let SceneFile {
+            name,
+            mesh: _,
+            tissue: _,
+            bone,
+            load,
+            pressure,
+            marker,
+            gravity,
+            inertia,
+            attachment,
+            solver,
+            run,
+            keyframe: _,
+        } = file;
+        let mut warnings = Vec::new();
+        let (mut terms, density) = self.tissue(file, &mesh, &mut warnings)?;
+        let mut bones = self.bones(bone, &mesh)?;
+        if let Some(rings) = attachment.as_ref().and_then(|a| a.free_rings.as_ref()) {
+            free_rings(&mesh, &mut bones, *rings.get_ref(), &mut warnings);
+        }
+        let counts: Vec<(Drive, usize)> = bones.iter().map(|b| (b.drive, b.nodes.len())).collect();
+        let layout = Layout::new(&counts, load.len(), pressure.len(), gravity.is_some());
+        let mut start = vec![0.0; layout.len()];
+        self.bone_starts(bone, &bones, &mesh, &layout, &mut start)?;
+
+        let loads = self.text.names("load", load.iter().map(|l| &l.name))?;
+        for (k, spec) in load.iter().enumerate() {
+            let input = layout.first(Slot::LoadForce).expect("a scene with loads has their port") + 3 * k;
+            terms.push(Box::new(self.load(spec, &mesh, input)?));
+            start[input..input + 3]
+                .copy_from_slice(&self.text.triple("load", "force", &spec.force)?.unwrap_or_default());
+        }
+        let pressures = self.text.names("pressure", pressure.iter().map(|p| &p.name))?;
+        for (k, spec) in pressure.iter().enumerate() {
+            let input = layout.first(Slot::LoadPressure).expect("a scene with pressures has their port") + k;
+            terms.push(Box::new(self.pressure(spec, &mesh, input)?));
+            start[input] = self.text.number("pressure", "pressure", &spec.pressure)?.unwrap_or(0.0);
+        }
+        let masses = || lumped_masses(&mesh, &density);
+        if let Some(spec) = gravity {
+            let input = layout.first(Slot::Gravity).expect("a scene with gravity has its port");
+            let g = self.text.triple("gravity", "acceleration", &spec.acceleration)?.unwrap_or([0.0, 0.0, -9.80665]);
+            start[input..input + 3].copy_from_slice(&g);
+            terms.push(Box::new(Gravity { m: masses(), input }));
+        }
+        let inertia = match inertia {
+            Some(spec) => {
+                terms.push(Box::new(Inertia { m: masses() }));
+                let start = self.text.choice("inertia", "start", &spec.start)?.unwrap_or("equilibrium");
+                Some(sim::Inertia { m: masses(), start_at_rest: start == "rest" })
+            }
+            None => None,
+        };
+        let triangles = mesh.face_set(SKIN).map_or(&[][..], |s| &s.triangles);
+        self.text.names("marker", marker.iter().map(|m| &m.name))?;
+        let mut markers = Vec::new();
+        for m in marker {
+            let at = self.text.vector("marker", "at", &m.at)?;
+            let (nodes, weights) = nearest_point(&mesh, triangles, &at).ok_or_else(|| self.text.no_skin(&m.name))?;
+            markers.push(Marker { name: m.name.get_ref().clone(), nodes, weights });
+        }
+        let spec = solver.as_ref();
+        let newton =
+            spec.map(|s| self.text.choice("solver", "method", &s.method)).transpose()?.flatten() == Some("newton");
+        let tolerance = spec.map(|s| self.text.number("solver", "tolerance", &s.tolerance)).transpose()?.flatten();
+        let max_iterations = match spec.and_then(|s| s.max_iterations.as_ref()) {
+            Some(n) if *n.get_ref() < 1 => {
+                return Err(self.text.out_of_range("solver", "max_iterations", n, n.get_ref()));
+            }
+            Some(n) => *n.get_ref(),
+            None => 200,
+        };
+        let strategy = Strategy {
+            memory: if newton { 0 } else { MEMORY },
+            refresh_after: if newton { 1 } else { REFRESH_AFTER },
+            tolerance: tolerance.unwrap_or(1e-7),
+            max_iterations,
+        };
+        let model = Model::new(ModelParts {
+            name: name.clone().unwrap_or_else(|| "scene".into()),
+            mesh,
+            bones,
+            loads,
+            pressures,
+            markers,
+            terms,
+            inertia,
+            layout,
+            start,
+            strategy,
+            identity: without_mesh_table(self.text.0),
+            warnings,
+        })?;
+        let (dt, end) = match run {
+            Some(run) => (self.text.number("run", "dt", &run.dt)?, self.text.number("run", "end", &run.end)?),
+            None => (None, None),
+        };
+        let tracks = self.tracks(file, model.ports())?;
+        Ok((model, Programme { dt: dt.unwrap_or(0.1), end: end.unwrap_or(1.0), tracks }))
+    }
+
+    /// One term for each material, and the density of each region.
+    fn tissue(
+        &self,
+        file: &SceneFile,
+        mesh: &TetMesh,
+        warnings: &mut Vec<String>,
+    ) -> Result<(Vec<Box<dyn Term>>, Vec<f64>), SceneError> {
+        let mut material = vec![usize::MAX; mesh.region_names.len()];
+        for (k, spec) in file.tissue.iter().enumerate() {
+            let Some(regions) = &spec.regions else {
+                material.iter_mut().filter(|m| **m == usize::MAX).for_each(|m| *m = k);
+                continue;
+            };
+            for name in regions {
+                let r = mesh.region_names.iter().position(|r| r == name.get_ref());
+                let r =
+                    r.ok_or_else(|| self.text.unknown("region", name, mesh.region_names.iter().map(String::as_str)))?;
+                if material[r] == usize::MAX {
+                    material[r] = k;
+                }
+            }
+        }
+        if let Some(r) = material.iter().position(|&m| m == usize::MAX) {
+            let message = format!(
+                "region `{}` of the mesh has no material: name it in a [[tissue]], or give one [[tissue]] without `regions`",
+                mesh.region_names[r]
+            );
+            return Err(self.text.at(file.mesh.span().start, message));
+        }
+        let mut terms = Vec::new();
+        let mut density = vec![0.0; mesh.region_names.len()];
+        for (k, spec) in file.tissue.iter().enumerate() {
+            let energy = self.text.choice("tissue", "energy", &spec.energy)?.unwrap_or("stable-neo-hookean");
+            let law = Elastic {
+                energy,
+                E: self.text.checked("tissue", "E", &spec.E)?,
+                nu: self.text.checked("tissue", "nu", &spec.nu)?,
+            };
+            let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
+            if law.nu > LOCKING_NU {
+                warnings.push(format!(
+                    "nu = {} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too small and \
+                     forces too large",
+                    law.nu
+                ));
+            }
+            let mine = |r: u32| material[r as usize] == k;
+            density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
+            let tets = mesh.tets.iter().zip(&mesh.region).filter(|(_, r)| mine(**r)).map(|(t, _)| *t);
+            if tets.clone().next().is_some() {
+                terms.push(elastic_tissue(&law, &mesh.nodes, tets).expect("keys list the catalogue's energies"));
+            }
+        }
+        Ok((terms, density))
+    }
+
+    fn bones(&self, specs: &[BoneSpec], mesh: &TetMesh) -> Result<Vec<Bone>, SceneError> {
+        self.text.names("bone", specs.iter().map(|b| &b.name))?;
+        let mut owner: Vec<Option<&str>> = vec![None; mesh.nodes.len()];
+        let mut bones = Vec::new();
+        for spec in specs {
+            let wanted = spec.nodes.as_ref().unwrap_or(&spec.name);
+            let set = mesh
+                .node_set(wanted.get_ref())
+                .ok_or_else(|| self.text.unknown("node set", wanted, mesh.node_sets.iter().map(|s| s.name.as_str())))?;
+            for &a in &set.nodes {
+                if let Some(other) = owner[a as usize].replace(spec.name.get_ref()) {
+                    let message = format!(
+                        "bones `{other}` and `{}` both claim node {a}; a node can stick to one bone only",
+                        spec.name.get_ref()
+                    );
+                    return Err(self.text.at(wanted.span().start, message));
+                }
+            }
+            let drive = match self.text.choice("bone", "drive", &spec.drive)?.unwrap_or("pose") {
+                "held" => Drive::Held,
+                "force" => Drive::Force,
+                "displacement" => Drive::Displacement,
+                _ => Drive::Pose,
+            };
+            bones.push(Bone { name: spec.name.get_ref().clone(), nodes: set.nodes.clone(), drive });
+        }
+        Ok(bones)
+    }
+
+    fn bone_starts(
+        &self,
+        specs: &[BoneSpec],
+        bones: &[Bone],
+        mesh: &TetMesh,
+        layout: &Layout,
+        start: &mut [f64],
+    ) -> Result<(), SceneError> {
+        for (b, (spec, bone)) in specs.iter().zip(bones).enumerate() {
+            let mut put = |slot: Slot, value: Option<[f64; 3]>| match (layout.first(slot), value) {
+                (Some(first), Some(value)) => start[first + 3 * b..first + 3 * b + 3].copy_from_slice(&value),
+                _ => {}
+            };
+            let centroid =
+                bone.nodes.iter().map(|&a| mesh.nodes[a as usize]).sum::<Vec3>() / bone.nodes.len().max(1) as f64;
+            put(Slot::BonePivot, Some(self.text.triple("bone", "pivot", &spec.pivot)?.unwrap_or(centroid.into())));
+            for (slot, key, value, drive) in [
+                (Slot::BoneTranslation, "translation", &spec.translation, Drive::Pose),
+                (Slot::BoneRotation, "rotation", &spec.rotation, Drive::Pose),
+                (Slot::BoneForce, "force", &spec.force, Drive::Force),
+                (Slot::BoneTorque, "torque", &spec.torque, Drive::Force),
+            ] {
+                if let Some(v) = value.as_ref().filter(|_| bone.drive != drive) {
+                    return Err(self.text.at(
+                        v.span().start,
+                        format!("`{key}` is for a {drive} bone; `{}` is {}", bone.name, bone.drive),
+                    ));
+                }
+                put(slot, self.text.triple("bone", key, value)?);
+            }
+        }
+        Ok(())
+    }
+
+    fn load(&self, spec: &LoadSpec, mesh: &TetMesh, input: usize) -> Result<DeadLoad, SceneError> {
+        let radius = self.text.number("load", "radius", &spec.radius)?;
+        let shares = match (&spec.at, &spec.region) {
+            (Some(at), None) => {
+                let p = self.text.vector("load", "at", at)?;
+                let skin = mesh.face_set(SKIN).map_or(&[][..], |s| &s.triangles);
+                match radius {
+                    Some(r) => {
+                        let faces = patch(mesh, skin, &p, r);
+                        if faces.is_empty() {
+                            return Err(self
+                                .text
+                                .at(at.span().start, format!("no skin triangle lies within {r} m of this place")));
+                        }
+                        area_shares(mesh, &faces)
+                    }
+                    None => {
+                        let distance = |a: &u32| (mesh.nodes[*a as usize] - p).norm_squared();
+                        let nearest = mesh.skin_nodes().into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+                        vec![(nearest.ok_or_else(|| self.text.no_skin(&spec.name))?, 1.0)]
+                    }
+                }
+            }
+            (None, Some(region)) => {
+                let r = mesh.region_names.iter().position(|r| r == region.get_ref());
+                let r =
+                    r.ok_or_else(|| self.text.unknown("region", region, mesh.region_names.iter().map(String::as_str)))?;
+                volume_shares(mesh, r as u32)
+            }
+            _ => {
+                let message =
+                    format!("load `{}` needs either `at` (with or without `radius`) or `region`", spec.name.get_ref());
+                return Err(self.text.at(spec.name.span().start, message));
+            }
+        };
+        Ok(DeadLoad { shares, input })
+    }
+
+    fn pressure(&self, spec: &PressureSpec, mesh: &TetMesh, input: usize) -> Result<Pressure, SceneError> {
+        let name = spec.faces.as_ref().map_or(SKIN, |f| f.get_ref());
+        let set = mesh.face_set(name).ok_or_else(|| {
+            let wanted = spec.faces.as_ref().unwrap_or(&spec.name);
+            self.text.unknown("face set", wanted, mesh.face_sets.iter().map(|s| s.name.as_str()))
+        })?;
+        let radius = self.text.number("pressure", "radius", &spec.radius)?;
+        let triangles = match (&spec.at, radius) {
+            (Some(at), Some(r)) => patch(mesh, &set.triangles, &self.text.vector("pressure", "at", at)?, r),
+            (None, None) => set.triangles.clone(),
+            _ => {
+                return Err(self
+                    .text
+                    .at(spec.name.span().start, "a patch of pressure needs both `at` and `radius`".into()));
+            }
+        };
+        if triangles.is_empty() {
+            return Err(self.text.at(
+                spec.name.span().start,
+                format!("pressure `{}` acts on no triangle of `{name}`", spec.name.get_ref()),
+            ));
+        }
+        Ok(Pressure { triangles, input })
+    }
+
+    fn tracks(&self, file: &SceneFile, ports: &[Port]) -> Result<Vec<Track>, SceneError> {
+        let mut tracks: Vec<Track> = Vec::new();
+        for frame in &file.keyframe {
+            let inputs = || ports.iter().filter(|p| p.causality == Causality::Input);
+            let wanted = frame.port.get_ref();
+            let (port, p) = ports
+                .iter()
+                .enumerate()
+                .find(|(_, p)| p.name == *wanted && p.causality == Causality::Input)
+                .ok_or_else(|| self.text.unknown("input", &frame.port, inputs().map(|p| p.name.as_str())))?;
+            let (offset, len) = match &frame.row {
+                None => (0, p.len()),
+                Some(row) => {
+                    let width = p.len() / p.shape[0];
+                    let k = p.rows.iter().position(|r| r == row.get_ref());
+                    let k = k.ok_or_else(|| self.text.unknown("row", row, p.rows.iter().map(String::as_str)))?;
+                    (k * width, width)
+                }
+            };
+            let values = numbers(frame.value.get_ref()).filter(|v| v.len() == len && v.iter().all(|c| c.is_finite()));
+            let values = values.ok_or_else(|| {
+                self.text.at(frame.value.span().start, format!("`value` must be {len} finite number(s) for `{wanted}`"))
+            })?;
+            let t = self.text.checked("keyframe", "t", &frame.t)?;
+            let same =
+                |track: &&mut Track| track.port == port && track.offset == offset && track.frames[0].1.len() == len;
+            match tracks.iter_mut().find(same) {
+                Some(track) => track.insert(t, values),
+                None => {
+                    let mut track = Track::new(port, offset, len, p);
+                    track.insert(t, values);
+                    tracks.push(track);
+                }
+            }
+        }
+        Ok(tracks)
+    }
+}
+
+/// Takes bone nodes within `rings` edges of another bone off their bone.
+fn free_rings(mesh: &TetMesh, bones: &mut [Bone], rings: u32, warnings: &mut Vec<String>) {
+    let mut freed = 0;
+    for _ in 0..rings {
+        let mut near: Vec<u32> = sim::osteotomy_edges(mesh, bones).into_iter().flat_map(|(a, b)| [a, b]).collect();
+        near.sort_unstable();
+        near.dedup();
+        freed += near.len();
+        for bone in bones.iter_mut() {
+            bone.nodes.retain(|a| near.binary_search(a).is_err());
+        }
+    }
+    if freed > 0 {
+        warnings.push(format!("{freed} bone node(s) next to another bone were set free (free_rings = {rings})"));
+    }
+}
+
+/// The scene without its `[mesh...]` tables: what identifies a model beside its mesh.
+fn without_mesh_table(text: &str) -> String {
+    let mut inside = false;
+    let keep = |line: &&str| {
+        if line.trim_start().starts_with('[') {
+            inside = line.trim_start().trim_start_matches('[').trim_start().starts_with("mesh");
+        }
+        !inside
+    };
+    text.lines().filter(keep).collect::<Vec<_>>().join("\n")
+}
+
+fn numbers(value: &toml::Value) -> Option<Vec<f64>> {
+    match value {
+        toml::Value::Float(v) => Some(vec![*v]),
+        toml::Value::Integer(v) => Some(vec![*v as f64]),
+        toml::Value::Array(items) => items.iter().map(numbers).collect::<Option<Vec<_>>>().map(|v| v.concat()),
+        _ => None,
+    }
+}

@@ -1,0 +1,162 @@
+//! What the TOML says. Nothing is computed here; `keys` documents every key, `build` gives it meaning.
+#![allow(missing_docs)] // each field is documented in `keys::KEYS`, which docs/scene.md prints
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::SceneError;
+
+/// A vector with the place where it stands in the text.
+pub type Triple = Spanned<[f64; 3]>;
+
+/// A scene as written.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    pub name: Option<String>,
+    pub mesh: Spanned<MeshSpec>,
+    pub tissue: Vec<TissueSpec>,
+    #[serde(default)]
+    pub bone: Vec<BoneSpec>,
+    #[serde(default)]
+    pub load: Vec<LoadSpec>,
+    #[serde(default)]
+    pub pressure: Vec<PressureSpec>,
+    #[serde(default)]
+    pub marker: Vec<MarkerSpec>,
+    pub gravity: Option<GravitySpec>,
+    pub inertia: Option<InertiaSpec>,
+    pub attachment: Option<AttachmentSpec>,
+    pub solver: Option<SolverSpec>,
+    pub run: Option<RunSpec>,
+    #[serde(default)]
+    pub keyframe: Vec<KeyframeSpec>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshSpec {
+    pub file: Option<String>,
+    pub head: Option<HeadSpec>,
+    pub block: Option<BlockSpec>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeadSpec {
+    pub edge: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BlockSpec {
+    pub origin: Option<Triple>,
+    pub size: Triple,
+    pub cells: Spanned<[usize; 3]>,
+    pub pattern: Option<Spanned<String>>,
+    #[serde(default)]
+    pub layers: Vec<(String, f64)>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TissueSpec {
+    pub regions: Option<Vec<Spanned<String>>>,
+    pub energy: Option<Spanned<String>>,
+    #[serde(rename = "E")]
+    pub E: Spanned<f64>,
+    pub nu: Spanned<f64>,
+    pub density: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoneSpec {
+    pub name: Spanned<String>,
+    pub nodes: Option<Spanned<String>>,
+    pub drive: Option<Spanned<String>>,
+    pub pivot: Option<Triple>,
+    pub translation: Option<Triple>,
+    pub rotation: Option<Triple>,
+    pub force: Option<Triple>,
+    pub torque: Option<Triple>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadSpec {
+    pub name: Spanned<String>,
+    pub at: Option<Triple>,
+    pub radius: Option<Spanned<f64>>,
+    pub region: Option<Spanned<String>>,
+    pub force: Option<Triple>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PressureSpec {
+    pub name: Spanned<String>,
+    pub faces: Option<Spanned<String>>,
+    pub at: Option<Triple>,
+    pub radius: Option<Spanned<f64>>,
+    pub pressure: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MarkerSpec {
+    pub name: Spanned<String>,
+    pub at: Triple,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GravitySpec {
+    pub acceleration: Option<Triple>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InertiaSpec {
+    pub start: Option<Spanned<String>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AttachmentSpec {
+    pub free_rings: Option<Spanned<u32>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolverSpec {
+    pub method: Option<Spanned<String>>,
+    pub tolerance: Option<Spanned<f64>>,
+    pub max_iterations: Option<Spanned<u32>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSpec {
+    pub dt: Option<Spanned<f64>>,
+    pub end: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeyframeSpec {
+    pub t: Spanned<f64>,
+    pub port: Spanned<String>,
+    pub row: Option<Spanned<String>>,
+    pub value: Spanned<toml::Value>,
+}
+
+impl SceneFile {
+    /// Reads a scene.
+    ///
+    /// # Errors
+    /// [`SceneError::Syntax`] with line, column and choices.
+    pub fn parse(text: &str) -> Result<SceneFile, SceneError> {
+        toml::from_str(text).map_err(|e| SceneError::Syntax(e.to_string().trim_end().to_owned()))
+    }
+}

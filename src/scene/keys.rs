@@ -1,0 +1,316 @@
+//! Every key of a scene: type, unit, range, default, meaning. The one place where these facts stand: `build` checks
+//! ranges against it, and docs/scene.md is printed from it.
+
+use std::fmt;
+
+/// Values a key may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Range {
+    /// Anything of the type (numbers must be finite).
+    Any,
+    /// Above zero.
+    Positive,
+    /// Zero or more.
+    NonNegative,
+    /// From the first to below the second.
+    From(f64, f64),
+    /// One of these names.
+    OneOf(&'static [&'static str]),
+    /// At least one.
+    AtLeastOne,
+}
+
+impl Range {
+    /// Whether a number lies within; names are checked by the caller.
+    pub fn holds(&self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Range::Positive => value > 0.0,
+                Range::NonNegative => value >= 0.0,
+                Range::From(low, high) => (*low..*high).contains(&value),
+                Range::AtLeastOne => value >= 1.0,
+                Range::Any | Range::OneOf(_) => true,
+            }
+    }
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Range::Any => write!(f, "any"),
+            Range::Positive => write!(f, "> 0"),
+            Range::NonNegative => write!(f, ">= 0"),
+            Range::From(low, high) => write!(f, "{low} <= . < {high}"),
+            Range::AtLeastOne => write!(f, ">= 1"),
+            Range::OneOf(names) => {
+                for (k, name) in names.iter().enumerate() {
+                    write!(f, "{}`\"{name}\"`", if k == 0 { "" } else { ", " })?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// One key of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Key {
+    /// Table it stands in; empty for the top level.
+    pub table: &'static str,
+    /// Name.
+    pub name: &'static str,
+    /// Type as TOML names it.
+    pub kind: &'static str,
+    /// SI unit; empty where there is none.
+    pub unit: &'static str,
+    /// Legal values.
+    pub range: Range,
+    /// Value if left out; "required", "none" or a TOML value.
+    pub default: &'static str,
+    /// What it means.
+    pub doc: &'static str,
+}
+
+const fn key(
+    table: &'static str,
+    name: &'static str,
+    kind: &'static str,
+    unit: &'static str,
+    range: Range,
+    default: &'static str,
+    doc: &'static str,
+) -> Key {
+    Key { table, name, kind, unit, range, default, doc }
+}
+
+use Range::{Any, AtLeastOne, From, NonNegative, OneOf, Positive};
+
+/// Highest Poisson's ratio a linear tetrahedron is let near; above 0.45 it already locks.
+const NU_LIMIT: f64 = 0.5;
+
+/// Every key, table by table.
+pub const KEYS: &[Key] = &[
+    key("", "name", "string", "", Any, "\"scene\"", "Name of the scene; stands in the model description."),
+    key(
+        "",
+        "mesh",
+        "table",
+        "",
+        Any,
+        "required",
+        "Where the tissue comes from: exactly one of `file`, `head`, `block`.",
+    ),
+    key(
+        "",
+        "tissue",
+        "array of tables",
+        "",
+        Any,
+        "required",
+        "Materials; each region of the mesh takes the first that names it.",
+    ),
+    key("", "bone", "array of tables", "", Any, "none", "Bones that hold or move the tissue."),
+    key("", "load", "array of tables", "", Any, "none", "Forces on a point, a patch of skin or a region."),
+    key("", "pressure", "array of tables", "", Any, "none", "Pressures that follow the surface."),
+    key("", "marker", "array of tables", "", Any, "none", "Points on the skin that the host reads."),
+    key("", "gravity", "table", "", Any, "none", "Weight of the tissue."),
+    key(
+        "",
+        "inertia",
+        "table",
+        "",
+        Any,
+        "none",
+        "Dynamics by backward Euler; without it every step is an equilibrium.",
+    ),
+    key("", "attachment", "table", "", Any, "none", "How the tissue sticks to the bones."),
+    key("", "solver", "table", "", Any, "none", "Accuracy and method."),
+    key("", "run", "table", "", Any, "none", "Step and end of `cutis run`; also the default experiment of the FMU."),
+    key(
+        "",
+        "keyframe",
+        "array of tables",
+        "",
+        Any,
+        "none",
+        "Programme of `cutis run`: inputs at given times, linear between them.",
+    ),
+    key(
+        "mesh",
+        "file",
+        "string",
+        "",
+        Any,
+        "none",
+        "Mesh file (`.cutis`, `.msh`, `.vtu`, `.vtk`), relative to the scene.",
+    ),
+    key("mesh", "head", "table", "", Any, "none", "The synthetic head."),
+    key("mesh", "block", "table", "", Any, "none", "A box."),
+    key("mesh.head", "edge", "float", "m", From(0.002, 0.012), "0.0065", "Edge of the lattice cell."),
+    key("mesh.block", "origin", "[float; 3]", "m", Any, "[0, 0, 0]", "Corner with the smallest coordinates."),
+    key("mesh.block", "size", "[float; 3]", "m", Positive, "required", "Edge lengths."),
+    key("mesh.block", "cells", "[integer; 3]", "", AtLeastOne, "required", "Cells along x, y and z."),
+    key(
+        "mesh.block",
+        "pattern",
+        "string",
+        "",
+        OneOf(&["six", "forty-eight"]),
+        "\"six\"",
+        "Tetrahedra of a cell: six about a diagonal, or 48 in eight mirrored cubes.",
+    ),
+    key(
+        "mesh.block",
+        "layers",
+        "array of [string, float]",
+        "",
+        Any,
+        "[]",
+        "Layers from z_max down: region name and share of the height; the rest is `tissue`.",
+    ),
+    key("tissue", "regions", "array of strings", "", Any, "all regions", "Regions of the mesh made of this material."),
+    key(
+        "tissue",
+        "energy",
+        "string",
+        "",
+        OneOf(&["linear", "corotational", "st-venant-kirchhoff", "stable-neo-hookean", "neo-hookean"]),
+        "\"stable-neo-hookean\"",
+        "Strain energy density.",
+    ),
+    key("tissue", "E", "float", "Pa", Positive, "required", "Young's modulus at small strain."),
+    key("tissue", "nu", "float", "", From(0.0, NU_LIMIT), "required", "Poisson's ratio at small strain."),
+    key("tissue", "density", "float", "kg/m3", Positive, "1000", "Mass density."),
+    key("bone", "name", "string", "", Any, "required", "Name: the row of the `bone.*` ports."),
+    key("bone", "nodes", "string", "", Any, "the name", "Node set of the mesh that sticks to the bone."),
+    key(
+        "bone",
+        "drive",
+        "string",
+        "",
+        OneOf(&["held", "pose", "force", "displacement"]),
+        "\"pose\"",
+        "Held at rest, moved by pose, by force and torque, or node by node.",
+    ),
+    key(
+        "bone",
+        "pivot",
+        "[float; 3]",
+        "m",
+        Any,
+        "centroid of the nodes",
+        "Rest position of the point that it turns about.",
+    ),
+    key("bone", "translation", "[float; 3]", "m", Any, "[0, 0, 0]", "Start value of `bone.translation`."),
+    key(
+        "bone",
+        "rotation",
+        "[float; 3]",
+        "rad",
+        Any,
+        "[0, 0, 0]",
+        "Start value of `bone.rotation`, a rotation vector.",
+    ),
+    key("bone", "force", "[float; 3]", "N", Any, "[0, 0, 0]", "Start value of `bone.force`."),
+    key("bone", "torque", "[float; 3]", "N m", Any, "[0, 0, 0]", "Start value of `bone.torque`."),
+    key("load", "name", "string", "", Any, "required", "Name: the row of `load.force`."),
+    key("load", "at", "[float; 3]", "m", Any, "none", "Place on the skin; the nearest skin node without `radius`."),
+    key(
+        "load",
+        "radius",
+        "float",
+        "m",
+        Positive,
+        "none",
+        "Spreads the force by area over the skin within this distance of `at`.",
+    ),
+    key("load", "region", "string", "", Any, "none", "Spreads the force by volume over a region instead."),
+    key("load", "force", "[float; 3]", "N", Any, "[0, 0, 0]", "Start value of the total force."),
+    key("pressure", "name", "string", "", Any, "required", "Name: the row of `load.pressure`."),
+    key("pressure", "faces", "string", "", Any, "\"skin\"", "Face set that it acts on."),
+    key("pressure", "at", "[float; 3]", "m", Any, "none", "Centre of a patch of that set."),
+    key("pressure", "radius", "float", "m", Positive, "none", "Radius of the patch."),
+    key("pressure", "pressure", "float", "Pa", Any, "0", "Start value; positive pushes into the tissue."),
+    key("marker", "name", "string", "", Any, "required", "Name: the row of `marker.position`."),
+    key("marker", "at", "[float; 3]", "m", Any, "required", "Place; the marker is the nearest point of the skin."),
+    key("gravity", "acceleration", "[float; 3]", "m/s2", Any, "[0, 0, -9.80665]", "Start value of `gravity`."),
+    key(
+        "inertia",
+        "start",
+        "string",
+        "",
+        OneOf(&["equilibrium", "rest"]),
+        "\"equilibrium\"",
+        "Whether time starts in equilibrium with the start inputs, or at rest.",
+    ),
+    key(
+        "attachment",
+        "free_rings",
+        "integer",
+        "",
+        NonNegative,
+        "0",
+        "Bone nodes within this many edges of another bone are set free (osteotomy lines, joints).",
+    ),
+    key(
+        "solver",
+        "method",
+        "string",
+        "",
+        OneOf(&["quasi-newton", "newton"]),
+        "\"quasi-newton\"",
+        "L-BFGS over a kept factor, or Newton with a new factor in every iteration.",
+    ),
+    key("solver", "tolerance", "float", "m", Positive, "1e-7", "Largest nodal motion of the last correction."),
+    key("solver", "max_iterations", "integer", "", AtLeastOne, "200", "Most linear solves in one piece of a step."),
+    key("run", "dt", "float", "s", Positive, "0.1", "Length of a step."),
+    key("run", "end", "float", "s", Positive, "1", "End time."),
+    key("keyframe", "t", "float", "s", NonNegative, "required", "Time."),
+    key("keyframe", "port", "string", "", Any, "required", "Input port, for example `bone.rotation`."),
+    key("keyframe", "row", "string", "", Any, "all rows", "Row of the port by name: a bone, a load, a pressure."),
+    key(
+        "keyframe",
+        "value",
+        "float or array",
+        "of the port",
+        Any,
+        "required",
+        "Values of that row (or of the whole port, row-major).",
+    ),
+];
+
+/// The table names in the order of [`KEYS`], without repetition.
+pub fn tables() -> Vec<&'static str> {
+    let mut tables: Vec<&str> = KEYS.iter().map(|k| k.table).collect();
+    tables.dedup();
+    tables
+}
+
+/// The key of this table and name.
+///
+/// # Panics
+/// If it is not listed; a test walks every key.
+pub(super) fn find(table: &str, name: &str) -> &'static Key {
+    KEYS.iter().find(|k| k.table == table && k.name == name).expect("every key that build asks for is listed")
+}
+
+/// The key reference as Markdown, one table a heading.
+pub fn key_reference() -> String {
+    let mut out = String::new();
+    for table in tables() {
+        let heading = if table.is_empty() { "Top level".to_owned() } else { format!("`[{table}]`") };
+        out += &format!(
+            "## {heading}\n\n| key | type | unit | range | default | meaning |\n| --- | --- | --- | --- | --- | --- |\n"
+        );
+        for k in KEYS.iter().filter(|k| k.table == table) {
+            let default = if k.default.starts_with(|c: char| c == '"' || c == '[' || c.is_ascii_digit()) {
+                format!("`{}`", k.default)
+            } else {
+                k.default.to_owned()
+            };
+            out += &format!("| `{}` | {} | {} | {} | {default} | {} |\n", k.name, k.kind, k.unit, k.range, k.doc);
+        }
+        out += "\n";
+    }
+    out
+}

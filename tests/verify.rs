@@ -1,0 +1,19 @@
+//! Is the mathematics right: derivatives, invariants, patch tests, closed forms, well-posedness.
+#![allow(non_snake_case)]
+
+#[path = "verify/common.rs"]
+mod common;
+#[path = "verify/derivatives.rs"]
+mod derivatives;
+#[path = "verify/invariants.rs"]
+mod invariants;
+#[path = "verify/loads.rs"]
+mod loads;
+#[path = "verify/patch.rs"]
+mod patch;
+#[path = "verify/rigid.rs"]
+mod rigid;
+#[path = "verify/scenes.rs"]
+mod scenes;
+#[path = "verify/time.rs"]
+mod time;

@@ -1,0 +1,156 @@
+//! Central differences along random directions at h and h/4 show order 2 for every energy and every term.
+//!
+//! Along a direction, since det F is linear in each single entry: entrywise differences would be exact and show no order.
+
+use cutis::effect::{DeadLoad, ENERGIES, Elastic, Gravity, Inertia, Pressure, elastic_tissue};
+use cutis::energy::{Corotational, Energy, Lame, Linear, NeoHookean, StVenantKirchhoff, StableNeoHookean};
+use cutis::fem::{At, Curvature, HessianSink, Term};
+use cutis::math::{Mat3, Vec3, vec9};
+
+use crate::common::Random;
+
+const SEED: u64 = 20_240_917;
+/// Orders that pass; the truth is 2.
+const ORDER: std::ops::Range<f64> = 1.95..2.05;
+/// Differences below this, relative to the value, are round-off and show no order.
+const ROUND_OFF: f64 = 1e-9;
+
+/// Order at which `difference(h)` approaches `exact`; 2 where it is exact already.
+fn order(exact: f64, scale: f64, difference: impl Fn(f64) -> f64) -> f64 {
+    let h = 1e-2;
+    let [e1, e4] = [h, h / 4.0].map(|h| (difference(h) - exact).abs());
+    if e1 <= ROUND_OFF * scale {
+        return 2.0;
+    }
+    assert!(e4 <= 1e-2 * scale, "difference {e4:.3e} is no derivative of scale {scale:.3e}");
+    0.5 * (e1 / e4).log2()
+}
+
+fn check_energy<M: Energy>(energy: &M, inverted: bool) {
+    let mut random = Random(SEED);
+    for k in 0..20 {
+        let mut F = Mat3::identity() + 0.35 * random.matrix();
+        if inverted && k % 2 == 1 {
+            F.column_mut(0).neg_mut();
+        }
+        if !inverted && F.determinant() < 0.2 {
+            continue;
+        }
+        let D = random.matrix();
+        let first = order(energy.P(&F).dot(&D), energy.P(&F).norm(), |h| {
+            (energy.psi(&(F + h * D)) - energy.psi(&(F - h * D))) / (2.0 * h)
+        });
+        assert!(ORDER.contains(&first), "{}: dpsi/dF of order {first:.3} at {F}", M::NAME);
+        let E = random.matrix();
+        let exact = vec9(&E).dot(&(energy.dPdF(&F) * vec9(&D)));
+        let second = order(exact, energy.dPdF(&F).norm(), |h| {
+            (energy.P(&(F + h * D)) - energy.P(&(F - h * D))).dot(&E) / (2.0 * h)
+        });
+        assert!(ORDER.contains(&second), "{}: dP/dF of order {second:.3} at {F}", M::NAME);
+    }
+}
+
+fn lame() -> Lame {
+    Lame::new(1.0, 0.45)
+}
+
+#[test]
+fn energies_have_the_derivatives_they_claim() {
+    check_energy(&Linear(lame()), true);
+    check_energy(&Corotational(lame()), false);
+    check_energy(&StVenantKirchhoff(lame()), true);
+    check_energy(&StableNeoHookean(lame()), true);
+    check_energy(&NeoHookean(lame()), false);
+    assert_eq!(ENERGIES.len(), 5, "an energy of the catalogue is not checked here");
+}
+
+struct WrongSign(StableNeoHookean);
+
+impl Energy for WrongSign {
+    const NAME: &'static str = "planted";
+    fn psi(&self, F: &Mat3) -> f64 {
+        self.0.psi(F)
+    }
+    fn P(&self, F: &Mat3) -> Mat3 {
+        self.0.P(F) - 0.2 * F
+    }
+    fn dPdF(&self, F: &Mat3) -> cutis::math::Mat9 {
+        self.0.dPdF(F)
+    }
+}
+
+#[test]
+#[should_panic]
+fn a_planted_error_in_an_energy_is_found() {
+    check_energy(&WrongSign(StableNeoHookean(lame())), true);
+}
+
+/// Two tetrahedra that share a face.
+const REST: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [1.1, 0.1, 0.0], [0.2, 0.9, -0.1], [0.1, 0.2, 1.0], [1.0, 1.1, 0.9]];
+const TETS: [[u32; 4]; 2] = [[0, 1, 2, 3], [1, 2, 3, 4]];
+
+struct Dense([[Mat3; 5]; 5]);
+
+impl HessianSink for Dense {
+    fn add(&mut self, nodes: &[u32], upper: &[Mat3]) {
+        let mut blocks = upper.iter();
+        for (k, &a) in nodes.iter().enumerate() {
+            for &b in &nodes[k..] {
+                let H = blocks.next().expect("as many blocks as pairs");
+                self.0[a as usize][b as usize] += H;
+                if a != b {
+                    self.0[b as usize][a as usize] += H.transpose();
+                }
+            }
+        }
+    }
+}
+
+fn check_term(term: &dyn Term, seed: u64) {
+    let rest = REST.map(Vec3::from);
+    let mut random = Random(seed);
+    let inputs: Vec<f64> = (0..8).map(|_| random.number()).collect();
+    let x_tilde: Vec<Vec3> = rest.iter().map(|X| X + 0.2 * random.vector()).collect();
+    let x_lag: Vec<Vec3> = rest.iter().map(|X| X + 0.2 * random.vector()).collect();
+    let at = At { t: 0.1, dt: 0.3, inputs: &inputs, x_tilde: &x_tilde, x_lag: &x_lag };
+    for _ in 0..10 {
+        let x: Vec<Vec3> = rest.iter().map(|X| X + 0.1 * random.vector()).collect();
+        let d: Vec<Vec3> = x.iter().map(|_| random.vector()).collect();
+        let w: Vec<Vec3> = x.iter().map(|_| random.vector()).collect();
+        let moved = |h: f64| x.iter().zip(&d).map(|(x, d)| x + h * d).collect::<Vec<_>>();
+        let gradient = |x: &[Vec3]| {
+            let mut g = vec![Vec3::zeros(); x.len()];
+            let energy = term.add_gradient(&at, x, &mut g);
+            assert!((energy - term.energy(&at, x)).abs() <= 1e-12 * energy.abs().max(1.0), "{}", term.name());
+            g
+        };
+        let dot = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
+        let g = gradient(&x);
+        let first = order(dot(&g, &d), dot(&g, &g).sqrt(), |h| {
+            (term.energy(&at, &moved(h)) - term.energy(&at, &moved(-h))) / (2.0 * h)
+        });
+        assert!(ORDER.contains(&first), "{}: gradient of order {first:.3}", term.name());
+        let mut H = Dense([[Mat3::zeros(); 5]; 5]);
+        term.add_hessian(&at, &x, Curvature::Exact, &mut H);
+        let Hd: Vec<Vec3> = (0..5).map(|a| (0..5).map(|b| H.0[a][b] * d[b]).sum::<Vec3>()).collect();
+        let second = order(dot(&w, &Hd), dot(&Hd, &Hd).sqrt().max(1e-12), |h| {
+            let (plus, minus) = (gradient(&moved(h)), gradient(&moved(-h)));
+            (dot(&plus, &w) - dot(&minus, &w)) / (2.0 * h)
+        });
+        assert!(ORDER.contains(&second), "{}: Hessian of order {second:.3}", term.name());
+    }
+}
+
+#[test]
+fn terms_have_the_derivatives_they_claim() {
+    let rest = REST.map(Vec3::from);
+    for (name, _) in ENERGIES {
+        let law = Elastic { energy: name, E: 1.0, nu: 0.4 };
+        check_term(&*elastic_tissue(&law, &rest, TETS.into_iter()).expect("a name of the catalogue"), SEED);
+    }
+    let m = vec![1.0, 2.0, 0.5, 1.5, 3.0];
+    check_term(&Gravity { m: m.clone(), input: 2 }, SEED + 1);
+    check_term(&Inertia { m }, SEED + 2);
+    check_term(&DeadLoad { shares: vec![(1, 0.25), (4, 0.75)], input: 1 }, SEED + 3);
+    check_term(&Pressure { triangles: vec![[0, 1, 2], [1, 4, 2]], input: 3 }, SEED + 4);
+}

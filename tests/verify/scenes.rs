@@ -1,0 +1,122 @@
+//! Scenes: errors that point and teach, well-posedness, and a key reference that cannot drift.
+
+use std::collections::BTreeSet;
+
+use cutis::scene::{KEYS, SceneFile, key_reference};
+
+use crate::common::{get, set, sim};
+
+const GOOD: &str = "[mesh.block]\nsize = [0.04, 0.02, 0.02]\ncells = [4, 2, 2]\n[[tissue]]\nE = 1e4\nnu = 0.4\n\
+                    [[bone]]\nname = \"skull\"\nnodes = \"x_min\"\n";
+
+fn refused(scene: &str) -> String {
+    match cutis::load::from_text(scene, None) {
+        Ok(_) => panic!("accepted:\n{scene}"),
+        Err(e) => e.to_string(),
+    }
+}
+
+#[test]
+fn slips_are_answered_with_line_column_and_choices() {
+    for (from, to, wanted) in [
+        ("nu = 0.4", "lamda = 1", vec!["line 6", "lamda", "nu"]),
+        ("nu = 0.4", "nu = 0.5", vec!["line 6, column 6", "nu", "0 <= . < 0.5"]),
+        ("E = 1e4", "E = -1.0", vec!["line 5", "-1", "> 0"]),
+        ("E = 1e4", "E = nan", vec!["line 5", "NaN"]),
+        ("E = 1e4", "E = 1e4\nenergy = \"neohookean\"", vec!["line 6", "neohookean", "stable-neo-hookean"]),
+        ("\"x_min\"", "\"xmin\"", vec!["line 9", "unknown node set `xmin`", "x_min"]),
+        ("[[bone]]", "[[bone]]\nname = \"a\"\nnodes = \"x_min\"\n[[bone]]", vec!["claim node"]),
+        ("cells = [4, 2, 2]", "cells = [4, 0, 2]", vec!["line 3", ">= 1"]),
+        ("[mesh.block]", "[mesh]\nfile = \"a.msh\"\n[mesh.block]", vec!["exactly one"]),
+        ("[[tissue]]", "[[tissue]]\nregions = [\"fat\"]", vec!["unknown region `fat`", "tissue"]),
+        (
+            "[[bone]]",
+            "[[keyframe]]\nt = 1.0\nport = \"bone.pose\"\nvalue = 1.0\n[[bone]]",
+            vec!["bone.pose", "bone.translation"],
+        ),
+        (
+            "[[bone]]",
+            "[[keyframe]]\nt = 1.0\nport = \"bone.rotation\"\nrow = \"jaw\"\nvalue = 1.0\n[[bone]]",
+            vec!["jaw", "skull"],
+        ),
+        ("[[bone]]", "[[load]]\nname = \"a\"\n[[bone]]", vec!["needs either `at`"]),
+    ] {
+        let message = refused(&GOOD.replacen(from, to, 1));
+        for part in wanted {
+            assert!(message.contains(part), "`{part}` is missing from:\n{message}");
+        }
+    }
+}
+
+#[test]
+fn loose_tissue_is_named() {
+    let message = refused(&GOOD[..GOOD.find("[[bone]]").unwrap()]);
+    assert!(message.contains("held by no bone") && message.contains("45 nodes"), "{message}");
+}
+
+#[test]
+fn a_bone_takes_only_the_inputs_of_its_drive() {
+    let mut sim = sim(&GOOD.replace(
+        "nodes = \"x_min\"",
+        "nodes = \"x_min\"\ndrive = \"held\"\n[[bone]]\nname = \"jaw\"\nnodes = \"x_max\"",
+    ));
+    set(&mut sim, "bone.translation", 0, &[0.0, 0.0, 1e-3]);
+    let message = sim.step(0.1).unwrap_err().to_string();
+    assert!(message.contains("bone.translation[1,3]") && message.contains("`skull` is held"), "{message}");
+    set(&mut sim, "bone.translation", 0, &[0.0, 0.0, 0.0, 1e-3, 0.0, 0.0]);
+    sim.step(0.1).expect("the jaw is driven");
+    assert!(get(&sim, "bone.reactionForce")[3] < 0.0);
+}
+
+#[test]
+fn an_osteotomy_line_is_seen_and_can_be_released() {
+    let text = GOOD.replace("[[bone]]\nname", "[[bone]]\nname = \"front\"\nnodes = \"y_min\"\n[[bone]]\nname");
+    let message = refused(&text);
+    assert!(message.contains("both claim"), "{message}");
+    // Two bones side by side on the bottom: a gap of one edge between x_min and the rest.
+    let two = "[mesh.block]\nsize = [0.02, 0.02, 0.02]\ncells = [1, 2, 2]\n[[tissue]]\nE = 1e4\nnu = 0.4\n\
+               [[bone]]\nname = \"a\"\nnodes = \"x_min\"\n[[bone]]\nname = \"b\"\nnodes = \"x_max\"\n";
+    let mut tight = sim(two);
+    assert!(tight.model().warnings().iter().any(|w| w.contains("free_rings")), "{:?}", tight.model().warnings());
+    set(&mut tight, "bone.translation", 3, &[0.008, 0.0, 0.0]);
+    let report = tight.step(0.1).expect("a jump");
+    assert!(report.warnings.iter().any(|w| w.contains("free_rings")), "{report:?}");
+    let message = refused(&format!("{two}[attachment]\nfree_rings = 1\n"));
+    assert!(message.contains("held by no bone"), "all nodes of so small a block are released: {message}");
+}
+
+/// Keys that serde accepts in a table, read off its own message about an unknown one.
+fn accepted(table: &str) -> BTreeSet<String> {
+    let probe = match table {
+        "" => "no_such_key = 1\n".to_owned(),
+        "tissue" | "bone" | "load" | "pressure" | "marker" | "keyframe" => format!("[[{table}]]\nno_such_key = 1\n"),
+        _ => format!("[{table}]\nno_such_key = 1\n"),
+    };
+    let message = SceneFile::parse(&probe).unwrap_err().to_string();
+    let list = message.split("expected").nth(1).unwrap_or_else(|| panic!("no choices in: {message}"));
+    list.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[test]
+fn every_key_is_documented_and_every_documented_key_exists() {
+    for table in cutis::scene::tables() {
+        let documented: BTreeSet<String> =
+            KEYS.iter().filter(|k| k.table == table).map(|k| k.name.to_owned()).collect();
+        assert_eq!(documented, accepted(table), "table [{table}]");
+    }
+    let key = KEYS.iter().find(|k| k.table == "tissue" && k.name == "energy").expect("documented");
+    let cutis::scene::Range::OneOf(choices) = key.range else { panic!("energies are chosen by name") };
+    assert_eq!(choices, cutis::effect::ENERGIES.map(|(name, _)| name));
+}
+
+#[test]
+fn the_key_reference_in_docs_is_up_to_date() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/scene.md");
+    let head = "# Scene reference\n\nOne TOML file says what is simulated; only what stands in it exists at run time. All numbers are SI. Unknown keys are\nrefused with line, column and choices. This page is generated from `src/scene/keys.rs` (`BLESS=1 cargo test --release`).\n\n";
+    let wanted = format!("{head}{}", key_reference()).trim_end().to_owned() + "\n";
+    if std::env::var_os("BLESS").is_some() {
+        std::fs::write(path, &wanted).expect("docs/scene.md can be written");
+    }
+    let found = std::fs::read_to_string(path).unwrap_or_default();
+    assert!(found == wanted, "docs/scene.md has drifted: run BLESS=1 cargo test --release");
+}
