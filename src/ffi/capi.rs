@@ -11,9 +11,9 @@ use super::guard::{self, Denied, Guarded, Handle};
 use super::instance::{Refusal, chain};
 use super::pointer::{self, place};
 use crate::error::Error;
-use crate::load;
+use crate::load::{self, Loaded};
 use crate::port::{Causality, Port, Type};
-use crate::sim::{Model, Sim, State};
+use crate::sim::{Sim, State};
 
 /// Moves on a break of the binary interface only; names are added, their meaning never changes.
 const ABI: u32 = 1;
@@ -196,8 +196,8 @@ unsafe fn copy_text(text: &str, buffer: *mut c_char, len: usize) -> usize {
 ///
 /// # Safety
 /// `why` is null or holds `why_len` bytes.
-unsafe fn new_sim(why: *mut c_char, why_len: usize, load: impl FnOnce() -> Result<Model, String>) -> *mut CutisSim {
-    let made = guard::caught(|| Sim::new(Arc::new(load()?)).map_err(|why| chain(&why)));
+unsafe fn new_sim(why: *mut c_char, why_len: usize, load: impl FnOnce() -> Result<Loaded, String>) -> *mut CutisSim {
+    let made = guard::caught(|| Sim::new(Arc::new(load()?.model)).map_err(|why| chain(&why)));
     match made.unwrap_or_else(|why| Err(format!("internal failure: {why}"))) {
         Ok(sim) => Handle::leak(Inner { sim, message: String::new(), poisoned: false }).cast(),
         Err(reason) => {

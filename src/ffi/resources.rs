@@ -14,10 +14,11 @@ pub(super) const SCENE: &str = "scene.toml";
 /// # Errors
 /// Those of loading a scene.
 pub(super) fn model(folder: Option<&Path>) -> Result<Model, Error> {
-    match folder.map(|f| f.join(SCENE)).filter(|scene| scene.is_file()) {
-        Some(scene) => load::from_file(&scene),
-        None => load::embedded(),
-    }
+    let loaded = match folder.map(|f| f.join(SCENE)).filter(|scene| scene.is_file()) {
+        Some(scene) => load::from_file(&scene)?,
+        None => load::embedded()?,
+    };
+    Ok(loaded.model)
 }
 
 /// Path of an `fmuResourceLocation` (FMI 2.0): `file:///p`, `file:/p`, `file://localhost/p`, percent-encoded or not,

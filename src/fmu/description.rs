@@ -7,18 +7,16 @@ use std::collections::BTreeMap;
 use quick_xml::Writer;
 
 use super::{FmiVersion, LOG_CATEGORIES, MODEL_IDENTIFIER, scalar_name, scalar_reference};
+use crate::load::Loaded;
 use crate::port::{Causality, Port, Type};
 use crate::sim::Model;
-
-/// Default experiment, s. The step is a power of two, so that every importer reaches the same times to the last bit.
-const STOP_TIME: &str = "1";
-const STEP_SIZE: &str = "0.015625";
 
 type Xml = Writer<Vec<u8>>;
 type Attributes = Vec<(&'static str, String)>;
 
-/// The model description of `model`.
-pub fn description(model: &Model, version: FmiVersion) -> String {
+/// The model description of a scene; its `[run]` table is the default experiment.
+pub fn description(scene: &Loaded, version: FmiVersion) -> String {
+    let Loaded { model, programme } = scene;
     let ports: Vec<&Port> = model.ports().iter().filter(|p| version.has(p)).collect();
     let mut root: Attributes = vec![
         ("fmiVersion", if version == FmiVersion::V3 { "3.0" } else { "2.0" }.to_owned()),
@@ -43,11 +41,9 @@ pub fn description(model: &Model, version: FmiVersion) -> String {
                 empty(xml, "Category", vec![("name", name.to_owned()), ("description", what.to_owned())]);
             }
         });
-        empty(
-            xml,
-            "DefaultExperiment",
-            vec![("startTime", "0".to_owned()), ("stopTime", STOP_TIME.to_owned()), ("stepSize", STEP_SIZE.to_owned())],
-        );
+        let (stop, step) = (programme.end.to_string(), programme.dt.to_string());
+        let experiment = vec![("startTime", "0".to_owned()), ("stopTime", stop), ("stepSize", step)];
+        empty(xml, "DefaultExperiment", experiment);
         match version {
             FmiVersion::V3 => {
                 element(xml, "ModelVariables", vec![], |xml| ports.iter().for_each(|p| variable3(xml, p, &types)));
@@ -233,6 +229,12 @@ fn start(port: &Port, offset: usize) -> f64 {
     port.start.get(offset).or(port.start.first()).copied().unwrap_or(0.0)
 }
 
+/// FMI has no names for rows, so the description tells them.
+fn about(port: &Port) -> String {
+    let sentence = port.description.trim_end_matches('.');
+    if port.rows.is_empty() { sentence.to_owned() } else { format!("{sentence}; rows: {}", port.rows.join(", ")) }
+}
+
 fn variable3(xml: &mut Xml, port: &Port, types: &Types) {
     let tag = match port.ty {
         Type::Float64 => "Float64",
@@ -242,7 +244,7 @@ fn variable3(xml: &mut Xml, port: &Port, types: &Types) {
     let mut attributes: Attributes = vec![
         ("name", port.name.clone()),
         ("valueReference", port.reference.to_string()),
-        ("description", port.description.clone()),
+        ("description", about(port)),
         ("causality", causality(port).to_owned()),
         ("variability", variability(port).to_owned()),
     ];

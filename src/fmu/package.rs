@@ -6,8 +6,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::{FmiVersion, MODEL_IDENTIFIER, description, documentation, terminals};
-use crate::load::Baked;
-use crate::sim::Model;
+use crate::load::{Baked, Loaded};
 
 /// Why an archive was not written.
 #[derive(Debug, thiserror::Error)]
@@ -37,27 +36,27 @@ pub fn platform(version: FmiVersion) -> String {
     }
 }
 
-/// The archive of `model`: `baked` goes into resources, `binary` is this platform's shared library.
+/// The archive of `scene`: `baked` goes into resources, `binary` is this platform's shared library.
 ///
 /// # Errors
 /// [`PackageError::NoLibrary`] without a library; others only where memory ends.
-pub fn package(model: &Model, baked: &Baked, binary: &[u8], version: FmiVersion) -> Result<Vec<u8>, PackageError> {
+pub fn package(scene: &Loaded, baked: &Baked, binary: &[u8], version: FmiVersion) -> Result<Vec<u8>, PackageError> {
     let folder = platform(version);
     if binary.is_empty() {
         return Err(PackageError::NoLibrary { folder });
     }
     let library = format!("binaries/{folder}/{MODEL_IDENTIFIER}{}", std::env::consts::DLL_SUFFIX);
     let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::new())));
-    archive.add("modelDescription.xml", 0o644, description(model, version).as_bytes())?;
+    archive.add("modelDescription.xml", 0o644, description(scene, version).as_bytes())?;
     archive.add(&library, 0o755, binary)?;
-    archive.add("documentation/index.html", 0o644, documentation(model, version).as_bytes())?;
+    archive.add("documentation/index.html", 0o644, documentation(&scene.model, version).as_bytes())?;
     archive.add("documentation/licenses/license.txt", 0o644, LICENSE.as_bytes())?;
     archive.add("documentation/licenses/LICENSE-APACHE", 0o644, include_bytes!("../../LICENSE-APACHE"))?;
     archive.add("documentation/licenses/LICENSE-MIT", 0o644, include_bytes!("../../LICENSE-MIT"))?;
     archive.add("resources/model.cutis", 0o644, &baked.mesh)?;
     archive.add("resources/scene.toml", 0o644, baked.scene.as_bytes())?;
     if version == FmiVersion::V3 {
-        archive.add("terminalsAndIcons/terminalsAndIcons.xml", 0o644, terminals(model).as_bytes())?;
+        archive.add("terminalsAndIcons/terminalsAndIcons.xml", 0o644, terminals(&scene.model).as_bytes())?;
     }
     Ok(archive.0.finish()?.into_inner())
 }

@@ -43,7 +43,7 @@ fn the_counter_counts() {
 
 #[test]
 fn set_and_get_allocate_nothing() {
-    let model = Arc::new(cutis::load::embedded().unwrap());
+    let model = Arc::new(cutis::load::embedded().unwrap().model);
     let mut sim = Sim::new(model.clone()).unwrap();
     sim.initialise().unwrap();
     for (k, port) in model.ports().iter().enumerate().filter(|(_, p)| p.ty == Type::Float64 && !p.is_empty()) {
@@ -72,7 +72,7 @@ fn the_c_library_and_fmi_copy_without_allocation() {
         assert_eq!(counted, 0);
         capi::cutis_sim_free(sim);
 
-        let token = std::ffi::CString::new(cutis::load::embedded().unwrap().token()).unwrap();
+        let token = std::ffi::CString::new(cutis::load::embedded().unwrap().model.token()).unwrap();
         use std::ptr::null;
         #[rustfmt::skip]
         let instance = fmi3::fmi3InstantiateCoSimulation(

@@ -6,14 +6,14 @@ use super::util::compare;
 
 #[test]
 fn model_descriptions_are_up_to_date() {
-    let model = cutis::load::embedded().unwrap();
-    compare("modelDescription.xml", &description(&model, FmiVersion::V3));
-    compare("fmu/fmi2.xml", &description(&model, FmiVersion::V2));
+    let scene = cutis::load::embedded().unwrap();
+    compare("modelDescription.xml", &description(&scene, FmiVersion::V3));
+    compare("fmu/fmi2.xml", &description(&scene, FmiVersion::V2));
 }
 
 #[test]
 fn the_default_scene_has_one_token() {
     let scene = super::util::root().join("fmu/scene.toml");
     let (here, there) = (cutis::load::embedded().unwrap(), cutis::load::from_file(&scene).unwrap());
-    assert_eq!(here.token(), there.token());
+    assert_eq!(here.model.token(), there.model.token());
 }

@@ -31,7 +31,7 @@ fn importer_and_library_agree_to_the_last_bit() {
     println!("archive to instance: {seconds:.3} s");
     assert!(seconds < LONGEST_START, "{seconds} s");
 
-    let mut sim = Sim::new(Arc::new(cutis::load::embedded().unwrap())).unwrap();
+    let mut sim = Sim::new(Arc::new(cutis::load::embedded().unwrap().model)).unwrap();
     let find = |name: &str| sim.model().ports().iter().position(|p| p.name == name).unwrap();
     let (bones, skin) = (find("bone.translation"), find("skin.position"));
     let n = sim.model().ports()[bones].len();
