@@ -6,14 +6,6 @@ use std::path::PathBuf;
 /// Why something at the level of files and scenes failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A file could not be read or written.
-    #[error("{path}: {source}", path = path.display())]
-    File {
-        /// Which file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
     /// A scene was refused.
     #[error("{path}: {source}", path = path.display())]
     Scene {

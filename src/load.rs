@@ -82,7 +82,7 @@ fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, E
 }
 
 fn read(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::File { path: path.into(), source })
+    Ok(io::read_text(path)?)
 }
 
 fn scene_error(path: &Path, source: SceneError) -> Error {

@@ -1,1 +1,8 @@
-fn main() {}
+//! The command line: arguments and printing only; the work is the library's.
+#![forbid(unsafe_code)]
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

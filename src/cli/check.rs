@@ -1,0 +1,39 @@
+//! `cutis check`: what a scene holds.
+
+use std::path::PathBuf;
+
+use cutis::load;
+
+#[derive(clap::Args)]
+pub struct Check {
+    /// Scene file (TOML)
+    scene: PathBuf,
+}
+
+impl Check {
+    pub fn run(self) -> super::Done {
+        let loaded = load::from_file(&self.scene)?;
+        let model = &loaded.model;
+        let mesh = model.mesh();
+        println!("{}: {} nodes, {} tets, token {}", model.name(), mesh.nodes.len(), mesh.tets.len(), model.token());
+        let volume: f64 = (0..mesh.tets.len()).map(|e| mesh.volume(e)).sum();
+        println!("volume {:.2} mL", 1e6 * volume);
+        for (r, name) in mesh.region_names.iter().enumerate() {
+            println!("  region {name}: {} tets", mesh.region.iter().filter(|&&x| x as usize == r).count());
+        }
+        for set in &mesh.face_sets {
+            println!("  faces {}: {} triangles", set.name, set.triangles.len());
+        }
+        for bone in &model.parts().bones {
+            println!("  bone {}: {} nodes, {}", bone.name, bone.nodes.len(), bone.drive);
+        }
+        println!("{:>6}  {:<28} {:<12} {:<6} direction", "ref", "variable", "shape", "unit");
+        for p in model.ports() {
+            println!("{:>6}  {:<28} {:<12} {:<6} {:?}", p.reference, p.name, format!("{:?}", p.shape), p.unit, p.causality);
+        }
+        for warning in model.warnings() {
+            println!("warning: {warning}");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,44 @@
+//! The commands, one a file.
+
+mod check;
+mod output;
+mod progress;
+mod run;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// What a command ends with; the message is for a person.
+type Done = Result<(), Box<dyn std::error::Error>>;
+
+/// Soft tissue of the human face: from a head CT to skin that moves in a co-simulation.
+#[derive(Parser)]
+#[command(name = "cutis", version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a scene's programme; writes a table, a ParaView series and a picture
+    Run(run::Run),
+    /// Say what a scene holds: mesh, bones, variables, warnings
+    Check(check::Check),
+}
+
+/// Runs the command that the arguments name.
+pub fn run() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Run(run) => run.run(),
+        Command::Check(check) => check.run(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("error: {e}");
+            ExitCode::FAILURE
+        }
+    }
+}

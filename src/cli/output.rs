@@ -1,0 +1,137 @@
+//! What runs leave behind: a table of ports, a ParaView series, a picture.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use cutis::io::{Data, write_bytes, write_pvd, write_vtu};
+use cutis::math::Vec3;
+use cutis::mesh::TetMesh;
+use cutis::port::{Causality, Port, Type};
+use cutis::sim::Sim;
+use cutis::view::{Camera, Image, Rgb, Surface, draw, heat};
+
+/// Columns of the table: time and every varying port but the skin's, elements counted from 1.
+pub struct Table {
+    text: String,
+}
+
+fn columns(sim: &Sim) -> impl Iterator<Item = (usize, &Port)> {
+    let wanted = |p: &Port| matches!(p.causality, Causality::Input | Causality::Output) && !p.name.starts_with("skin.");
+    sim.model().ports().iter().enumerate().filter(move |(_, p)| wanted(p))
+}
+
+/// `bone.translation[2,1]`.
+pub fn element(port: &Port, k: usize) -> String {
+    match port.shape.as_slice() {
+        [] => port.name.clone(),
+        [_] => format!("{}[{}]", port.name, k + 1),
+        [_, width, ..] => format!("{}[{},{}]", port.name, k / width + 1, k % width + 1),
+    }
+}
+
+impl Table {
+    /// The header line.
+    pub fn new(sim: &Sim) -> Table {
+        let names = columns(sim).flat_map(|(_, p)| (0..p.len()).map(|k| format!("\"{}\"", element(p, k))));
+        Table { text: format!("\"time\",{}\n", names.collect::<Vec<_>>().join(",")) }
+    }
+
+    /// Appends the values now; floats are written so that they read back to the same bits.
+    pub fn row(&mut self, sim: &Sim) {
+        write!(self.text, "{}", sim.time()).expect("writing to memory");
+        for (k, port) in columns(sim) {
+            let values: Vec<String> = match port.ty {
+                Type::Float64 => {
+                    let mut out = vec![0.0; port.len()];
+                    sim.get_f64(k, 0, &mut out).expect("a port of the model");
+                    out.iter().map(f64::to_string).collect()
+                }
+                Type::Int32 => {
+                    let mut out = vec![0; port.len()];
+                    sim.get_i32(k, 0, &mut out).expect("a port of the model");
+                    out.iter().map(i32::to_string).collect()
+                }
+                Type::Boolean => {
+                    let mut out = vec![false; port.len()];
+                    sim.get_bool(k, 0, &mut out).expect("a port of the model");
+                    out.iter().map(|b| u8::from(*b).to_string()).collect()
+                }
+            };
+            write!(self.text, ",{}", values.join(",")).expect("writing to memory");
+        }
+        self.text.push('\n');
+    }
+
+    /// Writes the table.
+    pub fn save(&self, path: &Path) -> super::Done {
+        write_bytes(path, self.text.as_bytes())?;
+        Ok(())
+    }
+}
+
+/// A ParaView time series of the whole mesh.
+pub struct Series {
+    folder: PathBuf,
+    frames: Vec<(f64, String)>,
+}
+
+impl Series {
+    pub fn new(folder: &Path) -> Series {
+        Series { folder: folder.into(), frames: Vec::new() }
+    }
+
+    /// Adds the mesh with its nodes at `x`.
+    pub fn add(&mut self, t: f64, mesh: &TetMesh, x: &[Vec3]) -> super::Done {
+        let u: Vec<f64> = x.iter().zip(&mesh.nodes).flat_map(|(x, X)| <[f64; 3]>::from(x - X)).collect();
+        let name = format!("step{:04}.vtu", self.frames.len());
+        let data = [Data { name: "displacement", components: 3, values: &u }];
+        write_vtu(&self.folder.join(&name), mesh, x, &data, &[])?;
+        self.frames.push((t, name));
+        Ok(())
+    }
+
+    /// Writes the index that ParaView opens.
+    pub fn save(&self) -> Result<PathBuf, Box<dyn std::error::Error>> {
+        let path = self.folder.join("series.pvd");
+        write_pvd(&path, &self.frames)?;
+        Ok(path)
+    }
+}
+
+const PANEL: (usize, usize) = (430, 560);
+const INK: Rgb = [0.15, 0.15, 0.18];
+
+/// Panels side by side, coloured by displacement on one scale, with captions and the scale.
+pub fn picture(mesh: &TetMesh, panels: &[(&str, &[Vec3])]) -> Image {
+    let all: Vec<Vec3> = panels.iter().flat_map(|(_, x)| x.iter().copied()).collect();
+    let largest = panels
+        .iter()
+        .flat_map(|(_, x)| x.iter().zip(&mesh.nodes).map(|(x, X)| (x - X).norm()))
+        .fold(1e-9, f64::max);
+    // LPS axes: the face looks to -y, its left is +x, up is +z; seen from the front, a little from its right.
+    let aspect = PANEL.0 as f64 / PANEL.1 as f64;
+    let camera = Camera::around(&all, Vec3::new(-0.55, -1.0, 0.10), Vec3::z(), aspect);
+    let mut image = Image::new(PANEL.0 * panels.len(), PANEL.1 + 70, [1.0; 3]);
+    for (k, (caption, x)) in panels.iter().enumerate() {
+        let moved = |a: u32| heat((x[a as usize] - mesh.nodes[a as usize]).norm() / largest);
+        let inner = |a: u32| moved(a).map(|c| 0.6 * c);
+        let surfaces: Vec<Surface> = mesh
+            .face_sets
+            .iter()
+            .map(|set| Surface {
+                triangles: &set.triangles,
+                colour: if set.name == cutis::mesh::SKIN { &moved } else { &inner },
+            })
+            .collect();
+        image.paste(&draw(x, &surfaces, &camera, PANEL.0, PANEL.1), k * PANEL.0, 0);
+        let left = k * PANEL.0 + (PANEL.0.saturating_sub(Image::text_width(caption, 2))) / 2;
+        image.text(caption, left, PANEL.1 + 6, 2, INK);
+    }
+    let (left, width, top) = (image.width / 2 - 200, 400, PANEL.1 + 36);
+    for k in 0..width {
+        image.fill(left + k, top, 1, 10, heat(k as f64 / (width - 1) as f64));
+    }
+    image.text("0", left - 20, top, 1, INK);
+    image.text(&format!("{:.1} mm moved", 1e3 * largest), left + width + 10, top, 1, INK);
+    image
+}

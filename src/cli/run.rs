@@ -1,0 +1,87 @@
+//! `cutis run`: the programme of a scene.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use cutis::load;
+use cutis::sim::Sim;
+
+use super::output::{Series, Table, picture};
+use super::progress;
+
+#[derive(clap::Args)]
+pub struct Run {
+    /// Scene file (TOML)
+    scene: PathBuf,
+    /// Folder for what the run leaves behind
+    #[arg(short, long, default_value = "out")]
+    out: PathBuf,
+    /// Write the table of ports only
+    #[arg(long)]
+    table_only: bool,
+}
+
+impl Run {
+    pub fn run(self) -> super::Done {
+        let loaded = load::from_file(&self.scene)?;
+        for warning in loaded.model.warnings() {
+            eprintln!("warning: {warning}");
+        }
+        let mut sim = Sim::new(Arc::new(loaded.model))?;
+        let model = sim.model().clone();
+        let programme = loaded.programme;
+        cutis::io::create_folder(&self.out)?;
+        let mut table = Table::new(&sim);
+        let mut series = Series::new(&self.out);
+        for s in programme.settings(0.0) {
+            sim.set_f64(s.port, s.offset, &s.values)?;
+        }
+        sim.initialise()?;
+        let start = sim.positions().to_vec();
+        table.row(&sim);
+        if !self.table_only {
+            series.add(0.0, model.mesh(), sim.positions())?;
+        }
+        let bar = progress::bar(programme.steps(), "steps");
+        let (mut iterations, mut spent) = (0, std::time::Duration::ZERO);
+        for k in 1..=programme.steps() {
+            let t = k as f64 * programme.dt;
+            for s in programme.settings(t) {
+                sim.set_f64(s.port, s.offset, &s.values)?;
+            }
+            let before = Instant::now();
+            let report = sim.step(programme.dt)?;
+            spent += before.elapsed();
+            iterations += report.iterations;
+            for warning in &report.warnings {
+                bar.suspend(|| eprintln!("warning: t = {t} s: {warning}"));
+            }
+            table.row(&sim);
+            if !self.table_only {
+                series.add(t, model.mesh(), sim.positions())?;
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        table.save(&self.out.join("ports.csv"))?;
+        println!(
+            "{}: {} nodes, {} tets, {} steps of {} s; {:.1} ms and {:.1} linear solves a step",
+            model.name(),
+            model.mesh().nodes.len(),
+            model.mesh().tets.len(),
+            programme.steps(),
+            programme.dt,
+            1e3 * spent.as_secs_f64() / programme.steps() as f64,
+            f64::from(iterations) / programme.steps() as f64
+        );
+        println!("wrote {}", self.out.join("ports.csv").display());
+        if !self.table_only {
+            println!("wrote {}", series.save()?.display());
+            let image = picture(model.mesh(), &[("start", &start), ("end", sim.positions())]);
+            cutis::io::write_bytes(&self.out.join("picture.png"), &image.to_png())?;
+            println!("wrote {}", self.out.join("picture.png").display());
+        }
+        Ok(())
+    }
+}
