@@ -10,6 +10,8 @@ pub mod effect;
 pub mod energy;
 pub mod error;
 pub mod fem;
+pub mod ffi;
+pub mod fmu;
 pub mod geometry;
 pub mod io;
 pub mod load;

@@ -1,0 +1,403 @@
+//! What both FMI versions share: a simulation, where it stands in its life, and the host's logger.
+//!
+//! All of it is safe code; `fmi2` and `fmi3` turn pointers into slices and call here.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::guard::Guarded;
+use super::logger::{Category, Logger, Status};
+use super::modes::{self, Call, Mode};
+use super::resources;
+use super::snapshot::Snapshot;
+use crate::port::{Causality, Port, Type};
+use crate::sim::{Sim, SimError, StepReport};
+
+/// Communication points may differ from the instance's time by this, relative to the larger of time and step: ten
+/// steps of 0.1 add up to 0.9999999999999999.
+const TIME_ROUNDING: f64 = 1e-9;
+
+/// Why a call is answered with something else than OK.
+#[derive(Debug)]
+pub(super) struct Refusal {
+    pub(super) status: Status,
+    pub(super) message: String,
+}
+
+/// The answer of every call.
+pub(super) type Answer = Result<(), Refusal>;
+
+/// An illegal call or argument, or a failure that the instance cannot go on from.
+pub(super) fn error(message: impl Into<String>) -> Refusal {
+    Refusal { status: Status::Error, message: message.into() }
+}
+
+fn discard(message: impl Into<String>) -> Refusal {
+    Refusal { status: Status::Discard, message: message.into() }
+}
+
+/// One FMU instance.
+pub(super) struct Instance {
+    pub(super) sim: Sim,
+    pub(super) mode: Mode,
+    /// In Initialization Mode: a value was set since the last equilibrium, so outputs are out of date.
+    stale: bool,
+    pub(super) start: Option<f64>,
+    stop: Option<f64>,
+    pub(super) logger: Logger,
+    /// Saved states; the host holds their addresses and can name no other.
+    states: Vec<Box<Snapshot>>,
+    poisoned: Option<String>,
+}
+
+impl Instance {
+    /// A new instance of the archive whose description carries `token`.
+    ///
+    /// # Errors
+    /// In words: the scene cannot be read, or it is not the one that was described.
+    pub(super) fn open(token: &str, folder: Option<&Path>, logger: Logger) -> Result<Self, (Logger, String)> {
+        let model = match resources::model(folder) {
+            Ok(model) => model,
+            Err(why) => return Err((logger, chain(&why))),
+        };
+        if model.token() != token {
+            let why = format!(
+                "the token is `{token}`, but the scene at hand has `{}`: the description is of another scene or version",
+                model.token()
+            );
+            return Err((logger, why));
+        }
+        match Sim::new(Arc::new(model)) {
+            Ok(sim) => Ok(Self {
+                sim,
+                mode: modes::INSTANTIATED,
+                stale: false,
+                start: None,
+                stop: None,
+                logger,
+                states: Vec::new(),
+                poisoned: None,
+            }),
+            Err(why) => Err((logger, chain(&why))),
+        }
+    }
+
+    /// Runs one call of the standard: legal now? then `body`; then status, log and mode follow from its answer.
+    pub(super) fn answer(&mut self, call: Call, error_mode: Mode, body: impl FnOnce(&mut Self) -> Answer) -> Status {
+        let answer = if let Some(why) = &self.poisoned {
+            Err(error(format!("the instance failed earlier (`{why}`); only reset and free are left")))
+        } else if call.legal & self.mode == 0 {
+            Err(error(format!("not legal in {}", modes::name(self.mode))))
+        } else {
+            body(self)
+        };
+        let Err(Refusal { status, message }) = answer else { return Status::Ok };
+        let category = if status == Status::Discard { Category::Discard } else { Category::Error };
+        if self.logger.hears(status, category) {
+            self.logger.log(status, category, &format!("{}: {message}", call.name));
+        }
+        if status == Status::Error {
+            self.mode = error_mode;
+        }
+        status
+    }
+
+    /// `EnterInitializationMode`, after `SetupExperiment` in FMI 2.0.
+    pub(super) fn set_experiment(&mut self, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Answer {
+        if let Some(tolerance) = tolerance.filter(|&t| !(t.is_finite() && t > 0.0)) {
+            return Err(error(format!("tolerance {tolerance} is not positive")));
+        }
+        if !start.is_finite() {
+            return Err(error(format!("start time {start} is not finite")));
+        }
+        if let Some(stop) = stop.filter(|&stop| !(stop.is_finite() && stop > start)) {
+            return Err(error(format!("stop time {stop} does not lie after start time {start}")));
+        }
+        self.start = Some(start);
+        self.stop = stop;
+        self.sim.set_time(start);
+        Ok(())
+    }
+
+    pub(super) fn enter_initialization(&mut self) -> Answer {
+        self.mode = modes::INITIALIZATION;
+        self.stale = true;
+        Ok(())
+    }
+
+    pub(super) fn exit_initialization(&mut self) -> Answer {
+        self.refresh()?;
+        self.mode = modes::STEP;
+        Ok(())
+    }
+
+    /// Finds the equilibrium of the start values if one of them moved since the last time. It is sought from rest each
+    /// time, so that a host which looks at outputs in between gets the same bits as one which does not.
+    fn refresh(&mut self) -> Answer {
+        if self.mode == modes::INITIALIZATION && self.stale {
+            self.back_to_rest().map_err(|why| error(chain(&why)))?;
+            let report = self.sim.initialise().map_err(|why| error(chain(&why)))?;
+            self.tell("initial equilibrium", &report);
+            self.stale = false;
+        }
+        Ok(())
+    }
+
+    /// As after instantiation, but for time, inputs and parameters.
+    fn back_to_rest(&mut self) -> Result<(), SimError> {
+        let model = self.sim.model().clone();
+        let mut kept = Vec::new();
+        for (i, port) in model.ports().iter().enumerate().filter(|(_, p)| p.is_settable()) {
+            let mut values = vec![0.0; port.len()];
+            self.sim.get_f64(i, 0, &mut values)?;
+            kept.push((i, values));
+        }
+        let t = self.sim.time();
+        self.sim.reset();
+        self.sim.set_time(t);
+        kept.iter().try_for_each(|(i, values)| self.sim.set_f64(*i, 0, values))
+    }
+
+    /// Advances from `at` by `dt`, s. A step that fails leaves everything as it was and is a Discard.
+    pub(super) fn step(&mut self, at: f64, dt: f64) -> Answer {
+        if !(dt.is_finite() && dt > 0.0) {
+            return Err(error(format!("communication step size {dt} is not positive and finite")));
+        }
+        let t = self.sim.time();
+        let rounding = TIME_ROUNDING * t.abs().max(dt);
+        // Written so that a NaN is refused as well.
+        if !((at - t).abs() <= rounding) {
+            return Err(error(format!("current communication point {at} is not where the instance stands, {t}")));
+        }
+        if let Some(stop) = self.stop.filter(|&stop| t + dt > stop + TIME_ROUNDING * stop.abs().max(dt)) {
+            return Err(error(format!("step from {t} by {dt} passes the stop time {stop}")));
+        }
+        let report = self.sim.step(dt).map_err(|why| discard(chain(&why)))?;
+        self.tell("step", &report);
+        Ok(())
+    }
+
+    fn tell(&self, what: &str, report: &StepReport) {
+        for warning in &report.warnings {
+            self.logger.log(Status::Warning, Category::Warning, warning);
+        }
+        if self.logger.hears(Status::Ok, Category::NonlinearSystems) {
+            let text = format!(
+                "{what} to t = {} s: {} iterations, residual {:.2e} N",
+                self.sim.time(),
+                report.iterations,
+                report.residual
+            );
+            self.logger.log(Status::Ok, Category::NonlinearSystems, &text);
+        }
+    }
+
+    pub(super) fn terminate(&mut self) -> Answer {
+        self.mode = modes::TERMINATED;
+        Ok(())
+    }
+
+    /// As after instantiation; logging and saved states stay. The one way back for a poisoned instance.
+    pub(super) fn reset(&mut self) -> Answer {
+        if self.poisoned.is_some() {
+            self.sim = Sim::new(self.sim.model().clone()).map_err(|why| error(chain(&why)))?;
+            self.poisoned = None;
+        } else {
+            self.sim.reset();
+        }
+        self.mode = modes::INSTANTIATED;
+        self.stale = false;
+        self.start = None;
+        self.stop = None;
+        Ok(())
+    }
+
+    /// Whether a panic has left only reset and free.
+    pub(super) fn is_poisoned(&self) -> bool {
+        self.poisoned.is_some()
+    }
+
+    /// The port that a host means by an FMI 3.0 value reference.
+    pub(super) fn port(&self, reference: u32, ty: Type) -> Result<(usize, &Port), Refusal> {
+        let ports = self.sim.model().ports();
+        let found = ports
+            .binary_search_by_key(&reference, |p| p.reference)
+            .ok()
+            .map(|i| (i, &ports[i]))
+            .filter(|(_, p)| !p.is_empty());
+        let (i, port) = found.ok_or_else(|| error(format!("no variable has value reference {reference}")))?;
+        if port.ty != ty {
+            return Err(error(format!("`{}` (value reference {reference}) is {:?}, not {ty:?}", port.name, port.ty)));
+        }
+        Ok((i, port))
+    }
+
+    /// Brings outputs up to date where the standard wants it: in Initialization Mode, when `port` is computed from
+    /// values that were set meanwhile. Between steps nothing is ever solved here.
+    pub(super) fn before_get(&mut self, port: usize) -> Answer {
+        if self.stale
+            && self.mode == modes::INITIALIZATION
+            && self.sim.model().ports()[port].causality == Causality::Output
+        {
+            return self.refresh();
+        }
+        Ok(())
+    }
+
+    /// Whether `values` may be written to `port` from element `offset` on, in this mode.
+    pub(super) fn check_set(&self, port: &Port, offset: usize, values: &[f64]) -> Answer {
+        let legal = match port.causality {
+            Causality::Input => modes::INSTANTIATED | modes::INITIALIZATION | modes::STEP,
+            Causality::Parameter => modes::INSTANTIATED | modes::INITIALIZATION,
+            Causality::Independent | Causality::Output | Causality::CalculatedParameter => 0,
+        };
+        if legal & self.mode == 0 {
+            return Err(error(format!(
+                "`{}` ({:?}) cannot be set in {}",
+                port.name,
+                port.causality,
+                modes::name(self.mode)
+            )));
+        }
+        let wrong = values.iter().position(|&v| {
+            !v.is_finite() || port.min.is_some_and(|min| v < min) || port.max.is_some_and(|max| v > max)
+        });
+        match wrong {
+            None => Ok(()),
+            Some(k) => {
+                let (min, max) = (port.min.unwrap_or(f64::NEG_INFINITY), port.max.unwrap_or(f64::INFINITY));
+                Err(error(format!(
+                    "element {} of `{}` was set to {} {}, wanted a finite value from {min} to {max}",
+                    offset + k,
+                    port.name,
+                    values[k],
+                    port.unit
+                )))
+            }
+        }
+    }
+
+    /// Writes what [`Instance::check_set`] allowed.
+    pub(super) fn set(&mut self, port: usize, offset: usize, values: &[f64]) -> Answer {
+        self.stale = true;
+        self.sim.set_f64(port, offset, values).map_err(|why| error(chain(&why)))
+    }
+
+    pub(super) fn get_f64(&self, port: usize, offset: usize, out: &mut [f64]) -> Answer {
+        self.sim.get_f64(port, offset, out).map_err(|why| error(chain(&why)))
+    }
+
+    pub(super) fn get_i32(&self, port: usize, offset: usize, out: &mut [i32]) -> Answer {
+        self.sim.get_i32(port, offset, out).map_err(|why| error(chain(&why)))
+    }
+
+    /// One truth value.
+    pub(super) fn get_bool(&self, port: usize, offset: usize) -> Result<bool, Refusal> {
+        let mut out = [false];
+        self.sim.get_bool(port, offset, &mut out).map_err(|why| error(chain(&why)))?;
+        Ok(out[0])
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        Snapshot { mode: self.mode, stale: self.stale, start: self.start, stop: self.stop, state: self.sim.save() }
+    }
+
+    /// Saves the state and returns its address; a known `old` address is overwritten in place.
+    pub(super) fn save(&mut self, old: *const Snapshot) -> Result<*const Snapshot, Refusal> {
+        let snapshot = self.snapshot();
+        self.keep(old, snapshot)
+    }
+
+    fn keep(&mut self, old: *const Snapshot, snapshot: Snapshot) -> Result<*const Snapshot, Refusal> {
+        if old.is_null() {
+            let kept = Box::new(snapshot);
+            let address: *const Snapshot = &raw const *kept;
+            self.states.push(kept);
+            return Ok(address);
+        }
+        let i = self.find(old)?;
+        *self.states[i] = snapshot;
+        Ok(old)
+    }
+
+    fn find(&self, state: *const Snapshot) -> Result<usize, Refusal> {
+        let known = |kept: &Box<Snapshot>| std::ptr::eq::<Snapshot>(&raw const **kept, state);
+        self.states
+            .iter()
+            .position(known)
+            .ok_or_else(|| error("the FMU state is none of this instance (a new one starts from NULL)"))
+    }
+
+    /// Goes back to a saved state: values, outputs, time and mode.
+    pub(super) fn restore(&mut self, state: *const Snapshot) -> Answer {
+        let i = self.find(state)?;
+        let Snapshot { mode, stale, start, stop, ref state } = *self.states[i];
+        self.sim.restore(state).map_err(|why| error(chain(&why)))?;
+        (self.mode, self.stale, self.start, self.stop) = (mode, stale, start, stop);
+        Ok(())
+    }
+
+    pub(super) fn forget(&mut self, state: *const Snapshot) -> Answer {
+        if state.is_null() {
+            return Ok(());
+        }
+        let i = self.find(state)?;
+        self.states.swap_remove(i);
+        Ok(())
+    }
+
+    /// The bytes of a saved state.
+    pub(super) fn serialize(&self, state: *const Snapshot) -> Result<Vec<u8>, Refusal> {
+        Ok(self.states[self.find(state)?].to_bytes(self.sim.model()))
+    }
+
+    /// A saved state from its bytes; where it is kept follows [`Instance::save`].
+    pub(super) fn deserialize(&mut self, bytes: &[u8], old: *const Snapshot) -> Result<*const Snapshot, Refusal> {
+        let snapshot = Snapshot::from_bytes(bytes, self.sim.model()).map_err(error)?;
+        self.keep(old, snapshot)
+    }
+
+    /// Called after a panic.
+    pub(super) fn poison(&mut self, why: String) {
+        self.logger.log(Status::Error, Category::Error, &format!("internal failure: {why}"));
+        self.poisoned = Some(why);
+    }
+}
+
+/// An error and its sources in one line.
+pub(super) fn chain(why: &dyn std::error::Error) -> String {
+    let mut text = why.to_string();
+    let mut source = why.source();
+    while let Some(inner) = source {
+        let more = inner.to_string();
+        if !text.contains(&more) {
+            text = format!("{text}: {more}");
+        }
+        source = inner.source();
+    }
+    text
+}
+
+/// An instance made through the FMI 3.0 functions.
+pub(super) struct Instance3(pub(super) Instance);
+
+/// An instance made through the FMI 2.0 functions.
+pub(super) struct Instance2 {
+    pub(super) common: Instance,
+    /// Answer of the last `fmi2DoStep`.
+    pub(super) last_step: Status,
+}
+
+impl Guarded for Instance3 {
+    const TAG: u64 = u64::from_le_bytes(*b"cutisFM3");
+    fn poison(&mut self, why: String) {
+        self.0.poison(why);
+    }
+}
+
+impl Guarded for Instance2 {
+    const TAG: u64 = u64::from_le_bytes(*b"cutisFM2");
+    fn poison(&mut self, why: String) {
+        self.common.poison(why);
+    }
+}

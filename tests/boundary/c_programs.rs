@@ -1,0 +1,62 @@
+//! C99 and C++11 programs against the header and the shared library; under valgrind where it is installed.
+
+use std::path::Path;
+use std::process::Command;
+
+use super::util::{library, root, scratch};
+
+fn run(command: &mut Command) -> String {
+    // Cargo's own path would lead a program to an older library.
+    command.env_remove("LD_LIBRARY_PATH").env("RUST_BACKTRACE", "0");
+    let output = command.output().unwrap_or_else(|why| panic!("{command:?}: {why}"));
+    let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{command:?}\n{text}");
+    text
+}
+
+fn available(tool: &str) -> bool {
+    Command::new(tool).arg("--version").output().is_ok_and(|o| o.status.success())
+}
+
+/// Compiles `source` strictly, runs it, returns what it says.
+fn build_and_run(compiler: &str, standard: &str, source: &Path, valgrind: bool) -> String {
+    let program = scratch("c").join(format!("{}_{compiler}", source.file_stem().unwrap().to_string_lossy()));
+    let folder = library().parent().unwrap().to_owned();
+    run(Command::new(compiler)
+        .args([standard, "-O1", "-g", "-Wall", "-Wextra", "-pedantic", "-Werror", "-I"])
+        .arg(root().join("include"))
+        .arg(source)
+        .arg("-o")
+        .arg(&program)
+        .arg("-L")
+        .arg(&folder)
+        .arg(format!("-Wl,-rpath,{}", folder.display()))
+        .args(["-lcutis", "-lm", "-ldl"]));
+    let scene = root().join("fmu/scene.toml");
+    if valgrind && available("valgrind") {
+        let mut checked = Command::new("valgrind");
+        checked
+            .args(["--error-exitcode=9", "--leak-check=full", "--errors-for-leak-kinds=definite", "-q"])
+            .arg(&program);
+        return run(checked.arg(&scene));
+    }
+    run(Command::new(&program).arg(&scene))
+}
+
+#[test]
+fn c99_smoke() {
+    let said = build_and_run("cc", "-std=c99", &root().join("tests/c/smoke.c"), true);
+    assert!(said.contains("smoke: all is well"), "{said}");
+}
+
+#[test]
+fn cpp11_smoke() {
+    let said = build_and_run("c++", "-std=c++11", &root().join("tests/c/smoke.cpp"), false);
+    assert!(said.contains("smoke: all is well"), "{said}");
+}
+
+#[test]
+fn fmi_functions_survive_misuse() {
+    let said = build_and_run("cc", "-std=c99", &root().join("tests/c/misuse.c"), true);
+    assert!(said.contains("misuse: all is well"), "{said}");
+}
