@@ -1,9 +1,9 @@
 //! From stuffed tetrahedra to a mesh that scenes can name: slit, face sets, bones, what is released.
 
+use super::Field;
 use super::stencils::Stuffed;
 use super::stuffing::{NO_WALL, Wall};
 use super::topology::{FACES, OPEN, fans, neighbours, stars};
-use super::Field;
 use crate::math::Vec3;
 use crate::mesh::{FaceSet, NodeSet, SKIN, TetMesh};
 
@@ -149,7 +149,8 @@ fn open(stuffed: &mut Stuffed, adjacent: &mut [[u32; 4]], slit: Slit) -> (Vec<u3
             let corners = t.map(|a| stuffed.nodes[a as usize]);
             let middles = [e, other as usize].map(|e| middle(stuffed, &stuffed.tets[e]));
             if slit(corners, middles[0], middles[1]) {
-                let back = (0..4).find(|&g| adjacent[other as usize][g] == e as u32).expect("neighbours know each other");
+                let back =
+                    (0..4).find(|&g| adjacent[other as usize][g] == e as u32).expect("neighbours know each other");
                 faces.extend([(4 * e + f) as u32, (4 * other as usize + back) as u32]);
                 t.iter().for_each(|&a| touched[a as usize] = true);
             }
