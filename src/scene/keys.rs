@@ -250,7 +250,7 @@ pub const KEYS: &[Key] = &[
         "",
         NonNegative,
         "0",
-        "Bone nodes within this many edges of another bone are set free (osteotomy lines, joints).",
+        "Bone nodes that two bones claim, or within this many edges of another bone, are set free (osteotomy lines, joints).",
     ),
     key(
         "solver",
