@@ -29,7 +29,14 @@ impl Check {
         }
         println!("{:>6}  {:<28} {:<12} {:<6} direction", "ref", "variable", "shape", "unit");
         for p in model.ports() {
-            println!("{:>6}  {:<28} {:<12} {:<6} {:?}", p.reference, p.name, format!("{:?}", p.shape), p.unit, p.causality);
+            println!(
+                "{:>6}  {:<28} {:<12} {:<6} {:?}",
+                p.reference,
+                p.name,
+                format!("{:?}", p.shape),
+                p.unit,
+                p.causality
+            );
         }
         for warning in model.warnings() {
             println!("warning: {warning}");

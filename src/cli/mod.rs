@@ -1,6 +1,7 @@
 //! The commands, one a file.
 
 mod check;
+mod fmu;
 mod output;
 mod progress;
 mod run;
@@ -24,6 +25,8 @@ struct Arguments {
 enum Command {
     /// Run a scene's programme; writes a table, a ParaView series and a picture
     Run(run::Run),
+    /// Pack a scene as FMI 3.0 and FMI 2.0 archives
+    Fmu(fmu::Fmu),
     /// Say what a scene holds: mesh, bones, variables, warnings
     Check(check::Check),
 }
@@ -32,6 +35,7 @@ enum Command {
 pub fn run() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Run(run) => run.run(),
+        Command::Fmu(fmu) => fmu.run(),
         Command::Check(check) => check.run(),
     };
     match done {

@@ -104,10 +104,8 @@ const INK: Rgb = [0.15, 0.15, 0.18];
 /// Panels side by side, coloured by displacement on one scale, with captions and the scale.
 pub fn picture(mesh: &TetMesh, panels: &[(&str, &[Vec3])]) -> Image {
     let all: Vec<Vec3> = panels.iter().flat_map(|(_, x)| x.iter().copied()).collect();
-    let largest = panels
-        .iter()
-        .flat_map(|(_, x)| x.iter().zip(&mesh.nodes).map(|(x, X)| (x - X).norm()))
-        .fold(1e-9, f64::max);
+    let largest =
+        panels.iter().flat_map(|(_, x)| x.iter().zip(&mesh.nodes).map(|(x, X)| (x - X).norm())).fold(1e-9, f64::max);
     // LPS axes: the face looks to -y, its left is +x, up is +z; seen from the front, a little from its right.
     let aspect = PANEL.0 as f64 / PANEL.1 as f64;
     let camera = Camera::around(&all, Vec3::new(-0.55, -1.0, 0.10), Vec3::z(), aspect);
