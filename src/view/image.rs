@@ -72,8 +72,7 @@ impl Image {
 
     /// The bytes of a PNG file.
     pub fn to_png(&self) -> Vec<u8> {
-        let bytes: Vec<u8> =
-            self.pixels.iter().flatten().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8).collect();
+        let bytes: Vec<u8> = self.pixels.iter().flatten().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8).collect();
         let mut out = Vec::new();
         let mut encoder = png::Encoder::new(&mut out, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);

@@ -35,9 +35,8 @@ impl Camera {
         let mut camera = Camera { towards, up, centre: Vec3::zeros(), extent: 1.0 };
         let axes = camera.axes();
         let seen = points.iter().map(|x| axes * x);
-        let (low, high) = seen.fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(l, h), p| {
-            (l.inf(&p), h.sup(&p))
-        });
+        let (low, high) = seen
+            .fold((Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)), |(l, h), p| (l.inf(&p), h.sup(&p)));
         let size = high - low;
         camera.centre = axes.transpose() * (0.5 * (low + high));
         camera.extent = 1.08 * size.y.max(size.x / aspect);
