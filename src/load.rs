@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
-use crate::geometry::{Block, Pattern, block};
+use crate::geometry::{Block, Head, Pattern, block};
 use crate::io;
 use crate::mesh::TetMesh;
 use crate::scene::{MeshSource, Programme, SceneError, SceneFile, build};
@@ -74,6 +74,20 @@ pub fn baked_default() -> Result<Baked, Error> {
     baked_text(DEFAULT_SCENE, Path::new("<default scene>"), None)
 }
 
+impl Baked {
+    /// Loads it as a component will: the mesh from these bytes.
+    ///
+    /// # Errors
+    /// [`Error`]; none for what [`baked`] made.
+    pub fn load(&self) -> Result<Loaded, Error> {
+        let path = Path::new(BAKED_NAME);
+        let file = parse(&self.scene, path)?;
+        let mesh = io::decode(&self.mesh, path)?;
+        let (model, programme) = build(&self.scene, &file, mesh).map_err(|e| scene_error(path, e))?;
+        Ok(Loaded { model, programme })
+    }
+}
+
 fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, Error> {
     let file = parse(text, path)?;
     let mesh = mesh_of(text, &file, path, folder)?;
@@ -107,7 +121,10 @@ fn mesh_of(text: &str, file: &SceneFile, path: &Path, folder: Option<&Path>) -> 
             let pattern = if forty_eight { Pattern::FortyEight } else { Pattern::Six };
             block(&Block { origin, size, cells, pattern, layers })?
         }
-        MeshSource::Head { .. } => todo!(),
+        MeshSource::Head { edge } => {
+            let standard = Head::default();
+            Head { edge: edge.unwrap_or(standard.edge), ..standard }.mesh()?.0
+        }
     })
 }
 

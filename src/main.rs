@@ -1,5 +1,6 @@
 //! The command line: arguments and printing only; the work is the library's.
 #![forbid(unsafe_code)]
+#![allow(non_snake_case)]
 
 mod cli;
 

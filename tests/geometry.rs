@@ -2,5 +2,9 @@
 mod geometry {
     mod block;
     mod ct_files;
+    mod distance;
+    mod head;
+    mod marching_cubes;
     mod mesh_files;
+    mod stuffing;
 }

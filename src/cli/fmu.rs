@@ -1,52 +1,67 @@
-//! `cutis fmu`: a scene as FMI 3.0 and FMI 2.0 archives.
+//! `cutis fmu`: archives for co-simulation tools.
 
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 
 use cutis::fmu::{FmiVersion, package};
-use cutis::load;
+use cutis::{io, load};
 
 #[derive(clap::Args)]
 pub struct Fmu {
-    /// Scene file (TOML); the default scene without
+    /// Scene file (TOML); the default scene if left out
     scene: Option<PathBuf>,
     /// Folder for cutis.fmu and cutis_fmi2.fmu
     #[arg(short, long, default_value = "out")]
     out: PathBuf,
-    /// Shared library to pack; the one built beside this program without
+    /// Shared library to pack; found beside this program if left out
     #[arg(long)]
     library: Option<PathBuf>,
 }
 
 impl Fmu {
     pub fn run(self) -> super::Done {
-        let (loaded, baked) = match &self.scene {
-            Some(scene) => (load::from_file(scene)?, load::baked(scene)?),
-            None => (load::embedded()?, load::baked_default()?),
-        };
-        let library = self.library.map_or_else(beside_this_program, Ok)?;
-        let binary = std::fs::read(&library).map_err(|why| format!("{}: {why}", library.display()))?;
-        cutis::io::create_folder(&self.out)?;
-        for version in [FmiVersion::V3, FmiVersion::V2] {
-            let bytes = package(&loaded, &baked, &binary, version)?;
-            let path = self.out.join(version.archive_name());
-            cutis::io::write_bytes(&path, &bytes)?;
-            println!("wrote {} ({:.1} MB)", path.display(), bytes.len() as f64 / 1e6);
+        for (path, bytes) in write(self.scene.as_deref(), self.library.as_deref(), &self.out)? {
+            println!("wrote {} ({:.2} MB)", path.display(), bytes as f64 / 1e6);
         }
         Ok(())
     }
 }
 
-/// Cargo leaves the library beside the program or in `deps`; the newer one counts.
-fn beside_this_program() -> Result<PathBuf, Box<dyn std::error::Error>> {
-    let program = std::env::current_exe()?;
-    let folder = program.parent().unwrap_or(Path::new("."));
-    let name = format!("{DLL_PREFIX}cutis{DLL_SUFFIX}");
-    let places = [folder.join(&name), folder.join("deps").join(&name), folder.join("../lib").join(&name)];
-    let built = |path: &PathBuf| path.metadata().and_then(|m| m.modified()).ok();
-    let newest = places.iter().filter_map(|path| Some((built(path)?, path))).max();
-    newest.map(|(_, path)| path.clone()).ok_or_else(|| {
-        format!("no {name} near {}: `cargo build --release` makes one, or name it with --library", program.display())
-            .into()
+/// Writes both archives into `out`; returns their paths and sizes.
+pub fn write(
+    scene: Option<&Path>,
+    library: Option<&Path>,
+    out: &Path,
+) -> Result<Vec<(PathBuf, usize)>, Box<dyn std::error::Error>> {
+    let baked = match scene {
+        Some(scene) => load::baked(scene)?,
+        None => load::baked_default()?,
+    };
+    let loaded = baked.load()?;
+    let binary = io::read_bytes(&library.map_or_else(find_library, |l| Ok(l.to_path_buf()))?)?;
+    io::create_folder(out)?;
+    let mut written = Vec::new();
+    for version in [FmiVersion::V3, FmiVersion::V2] {
+        let archive = package(&loaded, &baked, &binary, version)?;
+        let path = out.join(version.archive_name());
+        io::write_bytes(&path, &archive)?;
+        written.push((path, archive.len()));
+    }
+    Ok(written)
+}
+
+/// The shared library that was built together with this program.
+fn find_library() -> Result<PathBuf, Box<dyn std::error::Error>> {
+    let name = format!("{}cutis{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let here = std::env::current_exe()?;
+    let folder = here.parent().unwrap_or(Path::new("."));
+    // `cargo run` and `cargo test` leave a library that is only a dependency in deps.
+    let places = [folder.join(&name), folder.join("deps").join(&name)];
+    let newest = places.iter().filter(|p| p.is_file()).max_by_key(|p| p.metadata().and_then(|m| m.modified()).ok());
+    newest.cloned().ok_or_else(|| {
+        format!(
+            "no {name} in {} or its deps folder: build it with `cargo build --release`, or name it with --library",
+            folder.display()
+        )
+        .into()
     })
 }

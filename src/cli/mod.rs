@@ -1,6 +1,8 @@
 //! The commands, one a file.
 
+mod bake;
 mod check;
+mod demo;
 mod fmu;
 mod output;
 mod progress;
@@ -23,9 +25,13 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Make the synthetic head, pack it as FMU, open its jaw, push on its cheek, draw a picture
+    Demo(demo::Demo),
+    /// From a head CT to a tissue mesh
+    Bake(bake::Bake),
     /// Run a scene's programme; writes a table, a ParaView series and a picture
     Run(run::Run),
-    /// Pack a scene as FMI 3.0 and FMI 2.0 archives
+    /// Pack a scene as FMI 3.0 and FMI 2.0 co-simulation components
     Fmu(fmu::Fmu),
     /// Say what a scene holds: mesh, bones, variables, warnings
     Check(check::Check),
@@ -34,6 +40,8 @@ enum Command {
 /// Runs the command that the arguments name.
 pub fn run() -> ExitCode {
     let done = match Arguments::parse().command {
+        Command::Demo(demo) => demo.run(),
+        Command::Bake(bake) => bake.run(),
         Command::Run(run) => run.run(),
         Command::Fmu(fmu) => fmu.run(),
         Command::Check(check) => check.run(),

@@ -106,9 +106,9 @@ pub fn picture(mesh: &TetMesh, panels: &[(&str, &[Vec3])]) -> Image {
     let all: Vec<Vec3> = panels.iter().flat_map(|(_, x)| x.iter().copied()).collect();
     let largest =
         panels.iter().flat_map(|(_, x)| x.iter().zip(&mesh.nodes).map(|(x, X)| (x - X).norm())).fold(1e-9, f64::max);
-    // LPS axes: the face looks to -y, its left is +x, up is +z; seen from the front, a little from its right.
+    // LPS axes: the face looks to -y, its left is +x, up is +z; seen from the front, a little from its left.
     let aspect = PANEL.0 as f64 / PANEL.1 as f64;
-    let camera = Camera::around(&all, Vec3::new(-0.55, -1.0, 0.10), Vec3::z(), aspect);
+    let camera = Camera::around(&all, Vec3::new(0.55, -1.0, 0.10), Vec3::z(), aspect);
     let mut image = Image::new(PANEL.0 * panels.len(), PANEL.1 + 70, [1.0; 3]);
     for (k, (caption, x)) in panels.iter().enumerate() {
         let moved = |a: u32| heat((x[a as usize] - mesh.nodes[a as usize]).norm() / largest);

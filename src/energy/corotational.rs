@@ -23,14 +23,18 @@ impl Energy for Corotational {
     const NAME: &'static str = "corotational";
 
     fn psi(&self, F: &Mat3) -> f64 {
-        let s = svd(F).s;
-        let stretch = s - Vec3::repeat(1.0);
-        self.0.mu * stretch.norm_squared() + 0.5 * self.0.lambda * stretch.sum().powi(2)
+        self.psi_and_P(F).0
     }
     fn P(&self, F: &Mat3) -> Mat3 {
+        self.psi_and_P(F).1
+    }
+    fn psi_and_P(&self, F: &Mat3) -> (f64, Mat3) {
+        let Lame { mu, lambda } = self.0;
         let f = svd(F);
         let R = f.U * f.V.transpose();
-        2.0 * self.0.mu * (F - R) + self.0.lambda * (f.s.sum() - 3.0) * R
+        let stretch = f.s - Vec3::repeat(1.0);
+        let psi = mu * stretch.norm_squared() + 0.5 * lambda * stretch.sum().powi(2);
+        (psi, 2.0 * mu * (F - R) + lambda * stretch.sum() * R)
     }
     fn dPdF(&self, F: &Mat3) -> Mat9 {
         let f = svd(F);

@@ -24,6 +24,10 @@ pub trait Energy: Send + Sync {
     fn psi(&self, F: &Mat3) -> f64;
     /// First Piola-Kirchhoff stress P = d psi / dF, Pa.
     fn P(&self, F: &Mat3) -> Mat3;
+    /// Both at once, for laws whose two share work.
+    fn psi_and_P(&self, F: &Mat3) -> (f64, Mat3) {
+        (self.psi(F), self.P(F))
+    }
     /// Tangent d2 psi / dF2 over `vec(F)`, Pa.
     fn dPdF(&self, F: &Mat3) -> Mat9;
 }

@@ -67,12 +67,13 @@ impl<M: Energy> Kernel<4> for Tet4<M> {
     fn gradient(&self, e: usize, x: &[Vec3; 4], g: &mut [Vec3; 4]) -> f64 {
         let Element { dN, V, .. } = &self.elements[e];
         let F = deformation(dN, x);
-        let VP = *V * self.material.P(&F);
+        let (psi, P) = self.material.psi_and_P(&F);
+        let VP = *V * P;
         for a in 1..4 {
             g[a] = VP * dN[a];
         }
         g[0] = -(g[1] + g[2] + g[3]);
-        V * self.material.psi(&F)
+        V * psi
     }
     fn hessian(&self, e: usize, x: &[Vec3; 4], curvature: Curvature, upper: &mut [Mat3]) {
         let Element { dN, V, .. } = &self.elements[e];

@@ -35,6 +35,14 @@ pub enum MeshingError {
         /// Sum of the fractions up to and with it.
         sum: f64,
     },
+    /// Nothing lies between the surfaces, or all of it is thinner than the lattice sees.
+    #[error("no tissue lies between the surfaces ({walls}) at lattice edge {:.2} mm; check the thresholds and the region, or choose a shorter edge", edge * 1e3)]
+    NoTissue {
+        /// Names of the surfaces.
+        walls: String,
+        /// Lattice edge, m.
+        edge: f64,
+    },
     /// The finished mesh broke a rule every mesh keeps.
     #[error(transparent)]
     Mesh(#[from] MeshError),

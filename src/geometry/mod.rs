@@ -4,10 +4,42 @@
 //! same bits. Lengths are metres; only CT samples are Hounsfield units.
 #![forbid(unsafe_code)]
 
+mod assemble;
 mod block;
+mod distance;
 mod error;
+mod field;
+pub mod head;
+mod label;
+mod lattice;
+mod marching_cubes;
+mod nearest;
+mod quality;
+mod repair;
+mod shapes;
+mod sizing;
+mod stencils;
+mod stuffing;
+mod surface;
+mod tetrahedralise;
+mod topology;
 mod volume;
 
+pub use assemble::{CUT, FREE};
 pub use block::{Block, Pattern, block};
+pub use distance::{Distance, Isosurface, unsigned};
 pub use error::MeshingError;
+pub use field::{Ball, Cuboid, Field, gradient};
+pub use head::Head;
+pub use label::{LAYERS, LayerShare, Layers};
+pub use lattice::{Lattice, LatticePlane};
+pub use marching_cubes::marching_cubes;
+pub use nearest::Nearest;
+pub use quality::{MeshReport, SurfaceFigures, dihedrals, radius_ratio};
+pub use repair::Repair;
+pub use sizing::{Sizing, Uniform};
+pub use stencils::Stuffed;
+pub use stuffing::{NO_WALL, Side, Wall};
+pub use surface::{Surface, doubled_area, nearest_on_triangle};
+pub use tetrahedralise::{Stuffing, stuff, tetrahedralise};
 pub use volume::{Grid, Labels, Volume};

@@ -13,6 +13,8 @@ pub struct Svd {
     pub V: Mat3,
 }
 
+/// Squared cosine at which two columns count as orthogonal.
+const ORTHOGONAL: f64 = 1e-30;
 /// Sweeps after which the columns are orthogonal to round-off for every 3x3 matrix tried.
 const SWEEPS: usize = 12;
 
@@ -28,12 +30,14 @@ pub fn svd(F: &Mat3) -> Svd {
         let mut turned = false;
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let (alpha, beta, gamma) = (B[p].norm_squared(), B[q].norm_squared(), B[p].dot(&B[q]));
-            if gamma * gamma <= 1e-32 * alpha * beta {
+            if gamma * gamma <= ORTHOGONAL * alpha * beta {
                 continue;
             }
             turned = true;
-            let zeta = (beta - alpha) / (2.0 * gamma);
-            let t = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+            // tan of the angle that makes the columns orthogonal, written with one division.
+            let difference = beta - alpha;
+            let root = (difference * difference + 4.0 * gamma * gamma).sqrt();
+            let t = 2.0 * gamma / if difference < 0.0 { difference - root } else { difference + root };
             let c = 1.0 / (1.0 + t * t).sqrt();
             let s = c * t;
             (B[p], B[q]) = (c * B[p] - s * B[q], s * B[p] + c * B[q]);

@@ -57,6 +57,8 @@ pub(super) struct Workspace {
     /// Which linearisation the minimiser's factor was made from.
     factored: Option<Arc<Linearisation>>,
     config: Configuration,
+    /// Where the piece at hand started from.
+    before: Configuration,
     v: Vec<Vec3>,
     inputs: Vec<f64>,
     x_tilde: Vec<Vec3>,
@@ -83,6 +85,7 @@ impl Workspace {
             minimiser: Minimiser::new(&problem, parts.strategy),
             factored: None,
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
+            before: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             v: vec![Vec3::zeros(); if parts.inertia.is_some() { X.len() } else { 0 }],
             inputs: parts.start.clone(),
             x_tilde: if parts.inertia.is_some() { X.clone() } else { Vec::new() },
@@ -134,7 +137,8 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
         }
         read_wrenches(model, &work.inputs, &mut work.wrenches);
         // The piece starts from what the pieces before it left in `work`; a failed one is undone below.
-        let before = (work.config.clone(), linearisation.clone());
+        work.before.copy_from(&work.config);
+        let linearised_before = linearisation.clone();
         let t = state.t + to * dt;
         match step_piece(model, work, &mut linearisation, t, dt * (to - done), &mut report) {
             Ok(()) => {
@@ -143,7 +147,8 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
                 piece *= GROWTH;
             }
             Err(source) => {
-                (work.config, linearisation) = before;
+                work.config.copy_from(&work.before);
+                linearisation = linearised_before;
                 piece *= 0.5;
                 if piece < SMALLEST_PIECE {
                     return Err(SimError::Solve { t: state.t, dt, cuts: (1.0 / SMALLEST_PIECE) as u32, source });
@@ -201,14 +206,13 @@ fn step_piece(
 ) -> Result<(), SolveError> {
     let parts = model.parts();
     let dofs = model.dofs();
-    let Workspace { minimiser, factored, config, v, inputs, x_tilde, pivots, u, wrenches } = work;
+    let Workspace { minimiser, factored, config, before, v, inputs, x_tilde, pivots, u, wrenches } = work;
     for ((y, x), v) in x_tilde.iter_mut().zip(&config.x).zip(&*v) {
         *y = x + dt * v;
     }
     let at = At { t, dt, inputs, x_tilde, x_lag: &[] };
     let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
     let inverted_before = strain_of(model, &config.x).min_det_f <= 0.0;
-    let start = if parts.inertia.is_some() { config.x.clone() } else { Vec::new() };
 
     restore_factor(model, &problem, minimiser, factored, linearisation, config, report)?;
     place_bones(model, inputs, config);
@@ -233,7 +237,7 @@ fn step_piece(
         *linearisation = Some(made);
     }
     if parts.inertia.is_some() && dt > 0.0 {
-        for ((v, x), x0) in v.iter_mut().zip(&config.x).zip(&start) {
+        for ((v, x), x0) in v.iter_mut().zip(&config.x).zip(&before.x) {
             *v = (x - x0) / dt;
         }
     }

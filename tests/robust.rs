@@ -1,0 +1,10 @@
+//! Does it survive: inputs that are not numbers or far too large, violent motion, failed steps.
+#![allow(non_snake_case)]
+
+#[path = "verify/common.rs"]
+#[allow(dead_code)]
+mod common;
+#[path = "robust/inputs.rs"]
+mod inputs;
+#[path = "robust/violent.rs"]
+mod violent;
