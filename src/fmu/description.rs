@@ -57,10 +57,11 @@ pub fn description(scene: &Loaded, version: FmiVersion) -> String {
     })
 }
 
-/// The terminals of the FMI 3.0 archive: one bus for all ports whose names begin alike (`bone`, `skin`, `marker`).
+/// The terminals of the FMI 3.0 archive: one bus for the inputs and outputs whose names begin alike (`bone`, `skin`).
 pub fn terminals(model: &Model) -> String {
     let mut groups: BTreeMap<&str, Vec<(&str, &Port)>> = BTreeMap::new();
-    for port in model.ports().iter().filter(|p| FmiVersion::V3.has(p)) {
+    let signals = |p: &&Port| FmiVersion::V3.has(p) && matches!(p.causality, Causality::Input | Causality::Output);
+    for port in model.ports().iter().filter(signals) {
         if let Some((group, member)) = port.name.split_once('.') {
             groups.entry(group).or_default().push((member, port));
         }

@@ -1,0 +1,422 @@
+"""The component from outside: valid archives, one trajectory through every door, and physics that a host can check.
+
+Motions are multiples of a power of two and so are the times: an importer that interpolates inputs or adds up steps then
+reaches exactly the numbers of one that does not, and "identical" may mean identical bits.
+"""
+
+import csv
+import os
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import fmpy
+import numpy as np
+import pytest
+from conftest import ARCHIVES, RELEASE, ROOT, SCENE, Archive, Host2, Host3
+from fmpy.validation import validate_fmu
+
+DT = 1 / 64
+STEPS = 6
+# What both versions of the archive have.
+COMMON = ["marker.position", "bone.reactionForce", "bone.reactionTorque", "energy.elastic", "solver.residual"]
+
+
+def moving_row(sim):
+    """The jaw where there is one, else the last bone."""
+    rows = sim.rows("bone.translation")
+    return rows.index("mandible") if "mandible" in rows else len(rows) - 1
+
+
+@pytest.fixture(scope="session")
+def jaw(library):
+    """`bone.translation` for every step: nothing at first, then down (z) and back (y), m."""
+    sim = library.from_file(SCENE)
+    d = np.zeros((STEPS,) + sim.shape("bone.translation"))
+    for k in range(STEPS):
+        d[k, moving_row(sim)] = [0.0, k * 2.0**-13, -k * 2.0**-12]
+    return d
+
+
+def drive(host, d, names, c=False):
+    """Steps a host through the motion `d`; returns what `names` read after each step."""
+    host.initialise()
+    rows = []
+    for k in range(len(d)):
+        host.set("bone.translation", d[k])
+        host.step(DT) if c else host.step(k * DT, DT)
+        rows.append([np.asarray(host.get(name)).ravel() for name in names])
+    return [np.array(column) for column in zip(*rows)]
+
+
+@pytest.fixture(scope="session")
+def through_c(library, jaw):
+    sim = library.from_file(SCENE)
+    return dict(zip(["skin.position"] + COMMON, drive(sim, jaw, ["skin.position"] + COMMON, c=True)))
+
+
+# ------------------------------------------------------------------ archives
+
+
+@pytest.mark.parametrize("name", ["cutis.fmu", "cutis_fmi2.fmu"])
+def test_archive_is_valid(name):
+    assert validate_fmu(str(ARCHIVES / name)) == []
+
+
+@pytest.mark.parametrize("name", ["cutis.fmu", "cutis_fmi2.fmu"])
+def test_archive_is_small(name):
+    assert (ARCHIVES / name).stat().st_size < 20e6
+
+
+def test_token_is_that_of_the_scene(archive3, archive2, library):
+    token = library.from_file(SCENE).token()
+    assert archive3.description.instantiationToken == archive2.description.guid == token
+    assert library.default().token() == token
+
+
+def test_an_instance_is_ready_in_two_seconds(archive3):
+    start = time.perf_counter()
+    host = Host3(archive3)
+    seconds = time.perf_counter() - start
+    host.close()
+    print(f"instantiate: {seconds:.3f} s")
+    assert seconds < 2.0
+
+
+def test_get_is_a_copy(archive3):
+    host = Host3(archive3)
+    host.initialise()
+    start = time.perf_counter()
+    for _ in range(100):
+        x = host.get("skin.position")
+    seconds = (time.perf_counter() - start) / 100
+    host.close()
+    print(f"get skin.position ({x.size} values): {1e6 * seconds:.1f} us")
+    assert seconds < 1e-3
+
+
+# ------------------------------------------------------------------ one trajectory
+
+
+def test_fmi3_low_level_has_the_bits_of_the_c_library(host3, jaw, through_c):
+    names = list(through_c)
+    for name, values in zip(names, drive(host3, jaw, names)):
+        assert np.array_equal(values, through_c[name]), name
+    assert np.ptp(through_c["skin.position"], axis=0).max() > 1e-4
+
+
+def test_fmi2_low_level_has_the_bits_of_the_c_library(host2, jaw, through_c):
+    for name, values in zip(COMMON, drive(host2, jaw, COMMON)):
+        assert np.array_equal(values, through_c[name]), name
+
+
+def test_fmi3_high_level_has_the_bits_of_the_c_library(archive3, jaw, through_c):
+    inputs = [v for v in archive3.description.modelVariables if v.causality == "input" and v.name.startswith("bone.")]
+    signals = np.zeros(STEPS, dtype=[("time", "f8")] + [(v.name, "f8", tuple(v.shape)) for v in inputs])
+    signals["time"] = DT * np.arange(STEPS)
+    signals["bone.translation"] = jaw
+    names = ["skin.position"] + COMMON
+    result = fmpy.simulate_fmu(
+        str(archive3.path), stop_time=STEPS * DT, output_interval=DT, input=signals, output=names, set_stop_time=False
+    )
+    for name in names:
+        values = np.array([np.ravel(row) for row in result[name]])[1:]
+        assert np.array_equal(values, through_c[name].reshape(values.shape)), name
+
+
+def test_fmi2_high_level_has_the_bits_of_the_c_library(archive2, jaw, through_c):
+    inputs = [v.name for v in archive2.description.modelVariables if v.causality == "input"]
+    signals = np.zeros(STEPS, dtype=[("time", "f8")] + [(name, "f8") for name in inputs])
+    signals["time"] = DT * np.arange(STEPS)
+    for i, j in np.ndindex(*jaw.shape[1:]):
+        signals[f"bone.translation[{i + 1},{j + 1}]"] = jaw[:, i, j]
+    names = [v.name for v in archive2.description.modelVariables if v.name.startswith("marker.position")]
+    result = fmpy.simulate_fmu(
+        str(archive2.path), stop_time=STEPS * DT, output_interval=DT, input=signals, output=names, set_stop_time=False
+    )
+    values = np.stack([result[name] for name in names], axis=1)[1:]
+    assert np.array_equal(values, through_c["marker.position"])
+
+
+def test_command_line_has_the_bits_of_fmi3(archive3, tmp_path):
+    """`cutis run` follows the scene's own programme; its table says which inputs it set."""
+    done = subprocess.run([RELEASE / "cutis", "run", SCENE, "-o", tmp_path, "--table-only"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "ports.csv", newline="") as file:
+        rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+    assert len(rows) > 2
+
+    def array(row, name):
+        return np.array([v for k, v in row.items() if k == name or k.startswith(name + "[")])
+
+    host = Host3(archive3)
+    inputs = [v.name for v in archive3.description.modelVariables if v.causality == "input"]
+    for name in inputs:
+        host.set(name, array(rows[0], name))
+    host.initialise(rows[0]["time"])
+    dt = rows[1]["time"] - rows[0]["time"]
+    for before, row in zip(rows, rows[1:]):
+        for name in inputs:
+            host.set(name, array(row, name))
+        host.step(before["time"], dt)
+        for name in COMMON:
+            assert np.array_equal(host.get(name).ravel(), array(row, name)), (name, row["time"])
+    host.close()
+
+
+# ------------------------------------------------------------------ physics
+
+
+def quiet(sim):
+    """Takes the weight away, so that only the bones act."""
+    if "gravity" in sim.names():
+        sim.set("gravity", np.zeros(3))
+    return sim
+
+
+@pytest.fixture(scope="session")
+def free_sim(library):
+    """A new simulation of the scene without weight, all bones driven by pose."""
+    text = SCENE.read_text().replace('drive = "held"', 'drive = "pose"')
+    return lambda: quiet(library.from_text(text, SCENE.parent))
+
+
+def moved(sim, translation, rotation=None):
+    sim.initialise()
+    sim.set("bone.translation", translation)
+    if rotation is not None:
+        sim.set("bone.rotation", rotation)
+    sim.step(DT)
+    return sim.get("skin.position")
+
+
+def test_rigid_motion_of_all_bones_moves_the_skin_rigidly(free_sim):
+    sim = free_sim()
+    rest, pivots = sim.get("skin.restPosition"), sim.get("bone.pivot")
+    angle, shift = 0.1, np.array([0.01, -0.02, 0.005])
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    translation = pivots @ turn.T + shift - pivots
+    rotation = np.tile([angle, 0.0, 0.0], (len(pivots), 1))
+    x = moved(sim, translation, rotation)
+    assert np.abs(x - (rest @ turn.T + shift)).max() < 1e-6
+    assert np.abs(sim.get("bone.reactionForce")).max() < 1e-3
+
+
+def test_reactions_balance(free_sim):
+    sim = free_sim()
+    d = np.zeros(sim.shape("bone.translation"))
+    d[moving_row(sim)] = [1e-3, 1e-3, -2e-3]
+    moved(sim, d)
+    forces = sim.get("bone.reactionForce")
+    assert np.abs(forces).max() > 1e-3
+    assert np.linalg.norm(forces.sum(axis=0)) < 1e-4 * np.abs(forces).max()
+
+
+def test_reactions_carry_the_weight(free_sim):
+    sim = free_sim()
+    if "gravity" not in sim.names():
+        pytest.skip("the scene has no gravity")
+
+    def carried(g):
+        sim.reset()
+        sim.set("gravity", [0.0, 0.0, -g])
+        sim.initialise()
+        return sim.get("bone.reactionForce").sum(axis=0)
+
+    one, two = carried(1.0), carried(2.0)
+    assert one[2] < 0 and np.abs(one[:2]).max() < 1e-3 * -one[2]
+    assert np.allclose(two, 2 * one, rtol=1e-3, atol=1e-6)
+
+
+def test_small_motion_scales_linearly(free_sim):
+    def skin(scale):
+        sim = free_sim()
+        d = np.zeros(sim.shape("bone.translation"))
+        d[moving_row(sim)] = [0.0, scale, -scale]
+        return moved(sim, d) - sim.get("skin.restPosition")
+
+    one, two = skin(1e-5), skin(2e-5)
+    assert np.abs(two - 2 * one).max() < 2e-3 * np.abs(two).max()
+
+
+def test_symmetric_pull_gives_symmetric_skin(free_sim):
+    sim = free_sim()
+    rest = sim.get("skin.restPosition")
+    mirrored = rest * [-1, 1, 1]
+    distance = np.linalg.norm(mirrored[:, None] - rest[None], axis=2) if len(rest) < 3000 else None
+    if distance is None:
+        order = np.lexsort(np.round(rest, 6).T)
+        twin = np.empty(len(rest), dtype=int)
+        twin[np.lexsort(np.round(mirrored, 6).T)] = order
+    else:
+        twin = distance.argmin(axis=1)
+    if np.abs(rest[twin] - mirrored).max() > 1e-6:
+        pytest.skip("the mesh is not symmetric about x = 0")
+    d = np.zeros(sim.shape("bone.translation"))
+    d[moving_row(sim)] = [0.0, 1e-3, -2e-3]
+    u = moved(sim, d) - rest
+    assert np.abs(u[twin] * [-1, 1, 1] - u).max() < 0.05 * np.abs(u).max()
+
+
+# ------------------------------------------------------------------ state, reset, instances
+
+
+def finish(host, jaw, first):
+    for k in range(first, STEPS):
+        host.set("bone.translation", jaw[k])
+        host.step(k * DT, DT)
+    return host.get("marker.position")
+
+
+@pytest.mark.parametrize("kind", ["fmi3", "fmi2"])
+def test_state_goes_back_and_survives_another_process(kind, archive3, archive2, jaw, tmp_path):
+    archive = archive3 if kind == "fmi3" else archive2
+    host = (Host3 if kind == "fmi3" else Host2)(archive)
+    fmu = host.fmu
+    save = fmu.getFMUState if kind == "fmi3" else fmu.getFMUstate
+    restore = fmu.setFMUState if kind == "fmi3" else fmu.setFMUstate
+    free = fmu.freeFMUState if kind == "fmi3" else fmu.freeFMUstate
+    serialize = fmu.serializeFMUState if kind == "fmi3" else fmu.serializeFMUstate
+    host.initialise()
+    for k in range(2):
+        host.set("bone.translation", jaw[k])
+        host.step(k * DT, DT)
+    state = save()
+    data = serialize(state)
+    want = finish(host, jaw, 2)
+    for _ in range(2):
+        restore(state)
+        assert np.array_equal(finish(host, jaw, 2), want)
+    free(state)
+    host.close()
+
+    (tmp_path / "state").write_bytes(data)
+    np.save(tmp_path / "jaw.npy", jaw)
+    script = f"""
+        import sys; sys.path.insert(0, {str(ROOT / "tests" / "fmu")!r})
+        import numpy as np
+        from conftest import Archive, Host2, Host3
+        from test_fmu import finish
+        host = {"Host3" if kind == "fmi3" else "Host2"}(Archive({str(archive.path)!r}))
+        state = host.fmu.{"deserializeFMUState" if kind == "fmi3" else "deSerializeFMUstate"}(open({str(tmp_path / "state")!r}, "rb").read())
+        host.fmu.{"setFMUState" if kind == "fmi3" else "setFMUstate"}(state)
+        np.save({str(tmp_path / "there.npy")!r}, finish(host, np.load({str(tmp_path / "jaw.npy")!r}), 2))
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert np.array_equal(np.load(tmp_path / "there.npy"), want)
+
+
+def test_reset_is_like_new(host3, jaw, through_c):
+    host3.set("bone.translation", np.full(host3.shape("bone.translation"), 1e-3))
+    host3.initialise(5.0)
+    host3.step(5.0, DT)
+    host3.fmu.reset()
+    (skin,) = drive(host3, jaw, ["skin.position"])
+    assert np.array_equal(skin, through_c["skin.position"])
+
+
+def test_outputs_in_initialization_mode_do_not_change_the_bits(host3, jaw, through_c):
+    host3.fmu.enterInitializationMode(startTime=0.0)
+    host3.set("bone.translation", jaw[-1])
+    far = host3.get("marker.position")
+    host3.set("bone.translation", jaw[0])
+    near = host3.get("marker.position")
+    assert np.abs(far - near).max() > 1e-4
+    host3.fmu.exitInitializationMode()
+    for k in range(STEPS):
+        host3.set("bone.translation", jaw[k])
+        host3.step(k * DT, DT)
+    assert np.array_equal(host3.get("skin.position").ravel(), through_c["skin.position"][-1])
+
+
+def test_parallel_instances_do_not_meet(archive3, jaw, through_c):
+    hosts = [Host3(archive3) for _ in range(3)]
+    results = [None] * len(hosts)
+
+    def work(i):
+        results[i] = drive(hosts[i], jaw, ["skin.position"])[0]
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(len(hosts))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for host, skin in zip(hosts, results):
+        assert np.array_equal(skin, through_c["skin.position"])
+        host.close()
+
+
+# ------------------------------------------------------------------ misuse, each in a process of its own
+
+MISUSE = {
+    "nothing": "host.fmu.fmi3GetFloat64(host.fmu.component, None, 0, None, 0)",
+    "null values": "refused(lambda: host.fmu.fmi3GetFloat64(host.fmu.component, (c_uint32 * 1)(100), 1, None, 3))",
+    "unknown reference": "refused(lambda: host.fmu.getFloat64([999]))",
+    "one value of an array": "refused(lambda: host.fmu.getFloat64([100], nValues=1))",
+    "set an output": "refused(lambda: host.set('marker.position', host.get('marker.position')))",
+    "set NaN": "refused(lambda: host.set('bone.translation', np.full(host.shape('bone.translation'), np.nan)))",
+    "step too early": "refused(lambda: host.step(0.0, 0.1))",
+    "step of NaN": "host.initialise(); refused(lambda: host.step(0.0, float('nan')))",
+    "step of infinity": "host.initialise(); refused(lambda: host.step(0.0, float('inf')))",
+    "step back": "host.initialise(); refused(lambda: host.step(0.0, -0.1))",
+    "step of nothing": "host.initialise(); refused(lambda: host.step(0.0, 0.0))",
+    "step from elsewhere": "host.initialise(); refused(lambda: host.step(1.0, 0.1))",
+    "terminate twice": "host.initialise(); host.fmu.terminate(); refused(host.fmu.terminate)",
+    "initialise twice": "host.initialise(); refused(host.initialise)",
+    "start at NaN": "refused(lambda: host.initialise(float('nan')))",
+    "event mode": "host.initialise(); refused(host.fmu.enterEventMode)",
+    "derivatives": "host.initialise(); refused(lambda: host.fmu.getDirectionalDerivative([100], [10], [1.0], 1))",
+    "garbage as state": "refused(lambda: host.fmu.deserializeFMUState(b'x' * 1000))",
+    "state cut short": "s = host.fmu.serializeFMUState(host.fmu.getFMUState()); refused(lambda: host.fmu.deserializeFMUState(s[:-1]))",
+    "state of a flipped bit": "s = bytearray(host.fmu.serializeFMUState(host.fmu.getFMUState())); s[99] ^= 4; refused(lambda: host.fmu.deserializeFMUState(bytes(s)))",
+    "foreign state": "refused(lambda: host.fmu.setFMUState(c_void_p(4096)))",
+    "free nothing": "host.fmu.fmi3FreeInstance(None)",
+    "a huge motion": "host.initialise(); host.set('bone.translation', 1e6 * np.ones(host.shape('bone.translation')) * [[i] for i in range(host.shape('bone.translation')[0])]); refused(lambda: host.step(0.0, 0.1), also_fine=True)",
+}
+
+
+@pytest.mark.parametrize("what", MISUSE)
+def test_misuse_is_refused_and_survived(what, archive3):
+    script = f"""
+        import sys; sys.path.insert(0, {str(ROOT / "tests" / "fmu")!r})
+        from ctypes import *
+        import numpy as np
+        from conftest import Archive, Host3
+        archive = Archive({str(archive3.path)!r})
+        host = Host3(archive, logging=True)
+        def refused(body, also_fine=False):
+            try:
+                body()
+            except Exception:
+                assert host.log, "no message was logged"
+                return
+            assert also_fine, "not refused"
+        {MISUSE[what]}
+        host.fmu.reset()
+        host.initialise()
+        host.step(0.0, 0.125)
+        assert np.isfinite(host.get("skin.position")).all()
+        host.close()
+    """
+    environment = dict(os.environ, PYTHONFAULTHANDLER="1")
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=120, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert "panicked" not in done.stderr
+
+
+def test_wrong_token_and_name_are_refused(archive3):
+    class Wrong(Archive):
+        def __init__(self, archive):
+            self.description, self.folder = archive.description, archive.folder
+
+    wrong = Wrong(archive3)
+    token = wrong.description.instantiationToken
+    try:
+        wrong.description.instantiationToken = "{00000000}"
+        with pytest.raises(Exception, match="instantiate"):
+            Host3(wrong)
+    finally:
+        wrong.description.instantiationToken = token
