@@ -2,10 +2,12 @@
 
 use super::SceneError;
 use super::check::Text;
-use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile};
+use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile, TissueSpec};
+use super::keys::find;
 use super::place::{area_shares, nearest_point, patch, volume_shares};
 use super::programme::{Programme, Track};
-use crate::effect::{DeadLoad, Elastic, Gravity, Inertia, Pressure, elastic_tissue, lumped_masses};
+use crate::effect::{self, DeadLoad, Gravity, Inertia, Law, Pressure, lumped_masses};
+use crate::energy::Lame;
 use crate::fem::Term;
 use crate::math::Vec3;
 use crate::mesh::{SKIN, TetMesh};
@@ -170,28 +172,66 @@ impl Builder<'_> {
         let mut terms = Vec::new();
         let mut density = vec![0.0; mesh.region_names.len()];
         for (k, spec) in file.tissue.iter().enumerate() {
-            let energy = self.text.choice("tissue", "energy", &spec.energy)?.unwrap_or("stable-neo-hookean");
-            let law = Elastic {
-                energy,
-                E: self.text.checked("tissue", "E", &spec.E)?,
-                nu: self.text.checked("tissue", "nu", &spec.nu)?,
-            };
+            let (law, constants) = self.law(spec)?;
+            let Lame { mu, lambda } = (law.moduli)(&constants);
+            let nu = lambda / (2.0 * (lambda + mu));
             let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
-            if law.nu > LOCKING_NU {
+            if nu > LOCKING_NU {
                 warnings.push(format!(
-                    "nu = {} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too small and \
-                     forces too large",
-                    law.nu
+                    "Poisson's ratio {nu:.4} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too \
+                     small and forces too large"
                 ));
             }
             let mine = |r: u32| material[r as usize] == k;
             density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
             let tets = mesh.tets.iter().zip(&mesh.region).filter(|(_, r)| mine(**r)).map(|(t, _)| *t);
             if tets.clone().next().is_some() {
-                terms.push(elastic_tissue(&law, &mesh.nodes, tets).expect("keys list the catalogue's energies"));
+                let mut tets = tets;
+                terms.push((law.term)(&constants, (&mesh.nodes, &mut tets)));
             }
         }
         Ok((terms, density))
+    }
+
+    /// The law of a material and its constants, in the law's order.
+    fn law(&self, spec: &TissueSpec) -> Result<(&'static Law, Vec<Vec<f64>>), SceneError> {
+        let name = self.text.choice("tissue", "energy", &spec.energy)?.unwrap_or("stable-neo-hookean");
+        let law = effect::law(name).expect("keys list the catalogue's laws");
+        let wants = || law.keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
+        let mut constants: Vec<Vec<f64>> = vec![Vec::new(); law.keys.len()];
+        for (key, value) in spec.constants() {
+            let Some(value) = value else { continue };
+            let Some(k) = law.keys.iter().position(|wanted| *wanted == key) else {
+                return Err(self
+                    .text
+                    .at(value.span().start, format!("`{key}` is no constant of `{name}`, which takes {}", wants())));
+            };
+            let values = value.get_ref().values();
+            if let Some(bad) = values.iter().find(|v| !find("tissue", key).range.holds(**v)) {
+                return Err(self.text.out_of_range("tissue", key, value, bad));
+            }
+            if values.is_empty() || (values.len() > 1 && name != "ogden") {
+                return Err(self
+                    .text
+                    .at(value.span().start, format!("`{key}` of `{name}` is {} numbers; wanted one", values.len())));
+            }
+            constants[k] = values;
+        }
+        let place = spec.energy.as_ref().map_or(0, |e| e.span().start);
+        if let Some(k) = constants.iter().position(Vec::is_empty) {
+            let message = format!("`{name}` takes {}; `{}` is missing", wants(), law.keys[k]);
+            return Err(self.text.at(place, message));
+        }
+        if name == "ogden"
+            && (constants[0].len() != constants[1].len()
+                || constants[1].contains(&0.0)
+                || constants[0].iter().sum::<f64>() <= 0.0)
+        {
+            let message =
+                "`ogden` takes as many `mu` as `alpha`, no `alpha` of zero, and `mu` whose sum is positive".to_owned();
+            return Err(self.text.at(place, message));
+        }
+        Ok((law, constants))
     }
 
     /// Bones and their nodes. With `rings` > 0 a node that two bones claim belongs to neither.
