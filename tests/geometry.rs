@@ -1,5 +1,6 @@
 //! Geometry and io: shapes in, meshes out, and back again.
 mod geometry {
+    mod bake;
     mod block;
     mod ct_files;
     mod distance;

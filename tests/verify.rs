@@ -5,6 +5,8 @@
 mod common;
 #[path = "verify/derivatives.rs"]
 mod derivatives;
+#[path = "verify/golden.rs"]
+mod golden;
 #[path = "verify/invariants.rs"]
 mod invariants;
 #[path = "verify/loads.rs"]

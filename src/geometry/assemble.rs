@@ -1,9 +1,10 @@
 //! From stuffed tetrahedra to a mesh that scenes can name: slit, face sets, bones, what is released.
 
-use super::Field;
 use super::stencils::Stuffed;
 use super::stuffing::{NO_WALL, Wall};
-use super::topology::{FACES, OPEN, fans, neighbours, stars};
+use super::repair::compact;
+use super::topology::{FACES, OPEN, components, fans, neighbours, stars};
+use super::Field;
 use crate::math::Vec3;
 use crate::mesh::{FaceSet, NodeSet, SKIN, TetMesh};
 
@@ -51,11 +52,11 @@ pub(super) struct Assembled {
 
 /// Cuts the slit and names faces and nodes. Regions are left as one.
 pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
-    let mut adjacent = neighbours(&stuffed.tets);
     let (slit_faces, slit_nodes) = match naming.slit {
-        Some(slit) => open(&mut stuffed, &mut adjacent, slit),
+        Some(slit) => open(&mut stuffed, slit),
         None => (Vec::new(), 0),
     };
+    let adjacent = neighbours(&stuffed.tets);
     let (bone_of, released_nodes) = bones(&stuffed, naming);
     let mut names: Vec<&str> = vec![SKIN];
     names.extend(naming.bones.iter().map(|b| b.name));
@@ -65,7 +66,9 @@ pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
     for (e, tet) in stuffed.tets.iter().enumerate() {
         for f in (0..4).filter(|&f| adjacent[e][f] == OPEN) {
             let t = FACES[f].map(|a| tet[a]);
-            let in_slit = slit_faces.binary_search(&((4 * e + f) as u32)).is_ok();
+            let mut key = t;
+            key.sort_unstable();
+            let in_slit = slit_faces.binary_search(&key).is_ok();
             let set = match kind(&stuffed, t, naming) {
                 _ if in_slit => free,
                 Kind::Skin if (naming.is_outer)(&middle(&stuffed, &t)) => 0,
@@ -83,8 +86,12 @@ pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
         name: naming.bones[k].name.into(),
         nodes: (0u32..).zip(&bone_of).filter(|(_, b)| **b == Some(k)).map(|(a, _)| a).collect(),
     };
+    // A bone that the mesh does not reach is not named.
+    let reached: Vec<usize> = (0..naming.bones.len()).filter(|&k| !sets[1 + k].triangles.is_empty()).collect();
+    let unreached = |s: &FaceSet| s.triangles.is_empty() && naming.bones.iter().any(|b| b.name == s.name);
+    sets.retain(|s| !unreached(s));
     let mesh = TetMesh {
-        node_sets: (0..naming.bones.len()).map(node_set).collect(),
+        node_sets: reached.into_iter().map(node_set).collect(),
         face_sets: sets,
         region: vec![0; stuffed.tets.len()],
         region_names: vec!["tissue".into()],
@@ -135,33 +142,64 @@ fn bones(stuffed: &Stuffed, naming: &Naming) -> (Vec<Option<usize>>, usize) {
     (held, released)
 }
 
-/// Parts the tetrahedra along the slit's faces; returns the new boundary faces (4 e + f, sorted) and the nodes doubled.
-fn open(stuffed: &mut Stuffed, adjacent: &mut [[u32; 4]], slit: Slit) -> (Vec<u32>, usize) {
-    let mut faces = Vec::new();
+/// Parts the tetrahedra along the slit's faces, and drops what the slit cuts off. Returns the slit's faces on both sides
+/// by their sorted nodes, sorted, and the number of nodes doubled.
+fn open(stuffed: &mut Stuffed, slit: Slit) -> (Vec<[u32; 3]>, usize) {
+    let mut adjacent = neighbours(&stuffed.tets);
+    let faces = slit_faces(stuffed, &adjacent, slit);
     let mut touched = vec![false; stuffed.nodes.len()];
+    for &[e, f, other, back] in &faces {
+        adjacent[e][f] = OPEN;
+        adjacent[other][back] = OPEN;
+        FACES[f].iter().for_each(|&a| touched[stuffed.tets[e][a] as usize] = true);
+    }
+    double_nodes(stuffed, &adjacent, &touched);
+    let side = |e: usize, f: usize| {
+        let mut t = FACES[f].map(|a| stuffed.tets[e][a]);
+        t.sort_unstable();
+        t
+    };
+    // A face whose corners all hang together round its rim stays closed.
+    let opened = faces.iter().map(|&[e, f, other, back]| [side(e, f), side(other, back)]).filter(|[p, q]| p != q);
+    let mut opened: Vec<[u32; 3]> = opened.flatten().collect();
+    let new = keep_largest(stuffed);
+    opened.iter_mut().for_each(|t| {
+        *t = t.map(|a| new[a as usize]);
+        t.sort_unstable();
+    });
+    opened.retain(|t| !t.contains(&OPEN));
+    opened.sort_unstable();
+    let mut places: Vec<[u64; 3]> = stuffed.nodes.iter().map(|x| [x.x, x.y, x.z].map(|c| (c + 0.0).to_bits())).collect();
+    places.sort_unstable();
+    let doubled = places.windows(2).filter(|w| w[0] == w[1]).count();
+    (opened, doubled)
+}
+
+/// Faces of the slit: tetrahedron, face, and the same from the other side.
+fn slit_faces(stuffed: &Stuffed, adjacent: &[[u32; 4]], slit: Slit) -> Vec<[usize; 4]> {
+    let mut faces = Vec::new();
     for e in 0..stuffed.tets.len() {
         for f in 0..4 {
             let other = adjacent[e][f];
             if other == OPEN || (other as usize) < e {
                 continue;
             }
-            let t = FACES[f].map(|a| stuffed.tets[e][a]);
-            let corners = t.map(|a| stuffed.nodes[a as usize]);
+            let corners = FACES[f].map(|a| stuffed.nodes[stuffed.tets[e][a] as usize]);
             let middles = [e, other as usize].map(|e| middle(stuffed, &stuffed.tets[e]));
             if slit(corners, middles[0], middles[1]) {
-                let back =
-                    (0..4).find(|&g| adjacent[other as usize][g] == e as u32).expect("neighbours know each other");
-                faces.extend([(4 * e + f) as u32, (4 * other as usize + back) as u32]);
-                t.iter().for_each(|&a| touched[a as usize] = true);
+                let other = other as usize;
+                let back = (0..4).find(|&g| adjacent[other][g] == e as u32).expect("neighbours know each other");
+                faces.push([e, f, other, back]);
             }
         }
     }
-    for &face in &faces {
-        adjacent[face as usize / 4][face as usize % 4] = OPEN;
-    }
-    faces.sort_unstable();
+    faces
+}
+
+/// Gives every fan of tetrahedra round a touched node a node of its own.
+fn double_nodes(stuffed: &mut Stuffed, adjacent: &[[u32; 4]], touched: &[bool]) {
     let n_nodes = stuffed.nodes.len();
-    let (begin, items) = stars(&stuffed.tets, n_nodes, &touched);
+    let (begin, items) = stars(&stuffed.tets, n_nodes, touched);
     let mut edits = Vec::new();
     for node in (0..n_nodes).filter(|&a| touched[a]) {
         let star = &items[begin[node] as usize..begin[node + 1] as usize];
@@ -176,5 +214,15 @@ fn open(stuffed: &mut Stuffed, adjacent: &mut [[u32; 4]], slit: Slit) -> (Vec<u3
     for (e, old, new) in edits {
         stuffed.tets[e].iter_mut().filter(|a| **a == old).for_each(|a| *a = new);
     }
-    (faces, stuffed.nodes.len() - n_nodes)
+}
+
+/// Drops all but the largest component; returns the new number of each node.
+fn keep_largest(stuffed: &mut Stuffed) -> Vec<u32> {
+    let (component, n) = components(&neighbours(&stuffed.tets));
+    let mut sizes = vec![0usize; n];
+    component.iter().for_each(|&c| sizes[c as usize] += 1);
+    let keep = (0..n).max_by_key(|&c| (sizes[c], n - c)).unwrap_or(0) as u32;
+    let mut component = component.into_iter();
+    stuffed.tets.retain(|_| component.next() == Some(keep));
+    compact(stuffed)
 }

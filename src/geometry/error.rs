@@ -43,6 +43,26 @@ pub enum MeshingError {
         /// Lattice edge, m.
         edge: f64,
     },
+    /// A threshold that the volume never passes.
+    #[error("no {name} surface at {iso} HU: the samples range from {least} to {most}; check that the file is a CT in Hounsfield units (air -1000, water 0: an offset of 1024 is common) and the threshold")]
+    EmptyIsosurface {
+        /// "skin" or "bone".
+        name: &'static str,
+        /// Threshold, HU.
+        iso: f64,
+        /// Smallest sample.
+        least: f64,
+        /// Largest sample.
+        most: f64,
+    },
+    /// A region of interest that does not meet the volume.
+    #[error("the region of interest {region:.3?} m does not overlap the volume {volume:.3?} m by two lattice edges; give it in LPS coordinates of the scan")]
+    Region {
+        /// Corners asked for, LPS, m.
+        region: [[f64; 3]; 2],
+        /// Corners of the volume, LPS, m.
+        volume: [[f64; 3]; 2],
+    },
     /// The finished mesh broke a rule every mesh keeps.
     #[error(transparent)]
     Mesh(#[from] MeshError),

@@ -22,9 +22,9 @@ const MOUTH: f64 = 0.026;
 /// How far back the oral slit may reach, m: behind the front of the teeth.
 const TEETH: f64 = -0.06;
 /// The region of interest: brow, under the chin, in front of the ears, m.
-const TOP: f64 = 0.090;
-const BOTTOM: f64 = -0.060;
-const BACK: f64 = 0.006;
+const TOP: f64 = 0.088;
+const BOTTOM: f64 = -0.062;
+const BACK: f64 = 0.003;
 
 /// The synthetic head at a lattice edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +38,7 @@ pub struct Head {
 impl Default for Head {
     /// About 20 000 tetrahedra.
     fn default() -> Self {
-        Self { edge: 7.0e-3, layers: Layers::default() }
+        Self { edge: 7.8e-3, layers: Layers::default() }
     }
 }
 
@@ -52,7 +52,8 @@ pub fn skin(p: &Vec3) -> f64 {
     let p = Vec3::new(p.x.abs(), p.y, p.z);
     let mut d = ellipsoid(&p, [0.0, 0.0, 0.095], [0.076, 0.098, 0.084]);
     d = join(d, ellipsoid(&p, [0.0, -0.040, 0.028], [0.066, 0.054, 0.064]), 0.020);
-    d = join(d, ellipsoid(&p, [0.0, -0.034, -0.016], [0.060, 0.058, 0.042]), 0.020);
+    d = join(d, ellipsoid(&p, [0.0, -0.034, -0.015], [0.062, 0.059, 0.046]), 0.020);
+    d = join(d, ellipsoid(&p, [0.0, 0.006, 0.020], [0.071, 0.050, 0.070]), 0.020);
     d = join(d, rod(&p, [0.0, 0.010, -0.02], [0.0, 0.020, -0.15], 0.056), 0.020);
     d = join(d, ellipsoid(&p, [0.0, -0.082, -0.036], [0.022, 0.017, 0.016]), 0.016);
     d = join(d, ellipsoid(&p, [0.040, -0.058, 0.046], [0.024, 0.022, 0.018]), 0.016);
@@ -78,18 +79,18 @@ pub fn skull(p: &Vec3) -> f64 {
 /// Signed distance to the mandible with the lower teeth, m.
 pub fn mandible(p: &Vec3) -> f64 {
     let p = Vec3::new(p.x.abs(), p.y, p.z);
-    let mut d = rod(&p, [0.0, -0.072, -0.032], [0.020, -0.066, -0.031], 0.0095);
-    d = join(d, rod(&p, [0.020, -0.066, -0.031], [0.043, -0.014, -0.022], 0.0095), 0.006);
-    d = join(d, rod(&p, [0.043, -0.014, -0.022], [0.047, 0.000, 0.036], 0.0080), 0.010);
-    join(d, arch(&p, [0.0, -0.049], [0.026, 0.029], [-0.034, 0.0]), 0.006)
+    let mut d = rod(&p, [0.0, -0.071, -0.030], [0.020, -0.064, -0.028], 0.0090);
+    d = join(d, rod(&p, [0.020, -0.064, -0.028], [0.043, -0.014, -0.018], 0.0085), 0.006);
+    d = join(d, rod(&p, [0.043, -0.014, -0.018], [0.046, -0.002, 0.036], 0.0075), 0.010);
+    join(d, arch(&p, [0.0, -0.049], [0.026, 0.029], [-0.032, 0.0]), 0.006)
 }
 
 /// Signed distance to the space behind the face that is not meshed: mouth, throat and what lies deeper, m.
 pub fn cavity(p: &Vec3) -> f64 {
     let p = Vec3::new(p.x.abs(), p.y, p.z);
-    let d = ellipsoid(&p, [0.0, -0.006, 0.0], [0.038, 0.056, 0.044]);
+    let d = ellipsoid(&p, [0.0, -0.006, 0.0], [0.039, 0.058, 0.046]);
     let d = join(d, ellipsoid(&p, [0.0, 0.0, 0.050], [0.044, 0.050, 0.050]), 0.02);
-    join(d, rod(&p, [0.0, 0.005, -0.02], [0.0, 0.016, -0.10], 0.034), 0.02)
+    join(d, rod(&p, [0.0, 0.005, -0.02], [0.0, 0.016, -0.10], 0.038), 0.02)
 }
 
 /// Named points on the skin, m: soft-tissue landmarks for read-out.

@@ -5,7 +5,9 @@
 #![forbid(unsafe_code)]
 
 mod assemble;
+mod bake;
 mod block;
+mod clean;
 mod distance;
 mod error;
 mod field;
@@ -16,6 +18,7 @@ mod marching_cubes;
 mod nearest;
 mod quality;
 mod repair;
+mod separate;
 mod shapes;
 mod sizing;
 mod stencils;
@@ -26,6 +29,7 @@ mod topology;
 mod volume;
 
 pub use assemble::{CUT, FREE};
+pub use bake::{BakeOptions, Baked, Warning, bake};
 pub use block::{Block, Pattern, block};
 pub use distance::{Distance, Isosurface, unsigned};
 pub use error::MeshingError;

@@ -122,7 +122,8 @@ fn drop_smaller_fans(mesh: &mut Stuffed, edges: &[[u32; 2]], adjacent: &[[u32; 4
     mesh.tets.retain(|_| gone.next() == Some(false));
 }
 
-fn compact(mesh: &mut Stuffed) {
+/// Drops nodes that no tetrahedron uses; returns the new number of each node, `u32::MAX` for the dropped.
+pub(super) fn compact(mesh: &mut Stuffed) -> Vec<u32> {
     let mut new = vec![u32::MAX; mesh.nodes.len()];
     mesh.tets.as_flattened().iter().for_each(|&a| new[a as usize] = 0);
     let mut next = 0;
@@ -135,4 +136,5 @@ fn compact(mesh: &mut Stuffed) {
     let mut used = new.iter().map(|&n| n != u32::MAX);
     mesh.wall.retain(|_| used.next() == Some(true));
     mesh.tets.iter_mut().for_each(|t| *t = t.map(|a| new[a as usize]));
+    new
 }

@@ -52,9 +52,10 @@ impl Builder<'_> {
         } = file;
         let mut warnings = Vec::new();
         let (mut terms, density) = self.tissue(file, &mesh, &mut warnings)?;
-        let mut bones = self.bones(bone, &mesh)?;
-        if let Some(rings) = attachment.as_ref().and_then(|a| a.free_rings.as_ref()) {
-            free_rings(&mesh, &mut bones, *rings.get_ref(), &mut warnings);
+        let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
+        let mut bones = self.bones(bone, &mesh, rings)?;
+        if rings > 0 {
+            free_rings(&mesh, &mut bones, rings, &mut warnings);
         }
         let counts: Vec<(Drive, usize)> = bones.iter().map(|b| (b.drive, b.nodes.len())).collect();
         let layout = Layout::new(&counts, load.len(), pressure.len(), gravity.is_some());
@@ -193,9 +194,11 @@ impl Builder<'_> {
         Ok((terms, density))
     }
 
-    fn bones(&self, specs: &[BoneSpec], mesh: &TetMesh) -> Result<Vec<Bone>, SceneError> {
+    /// Bones and their nodes. With `rings` > 0 a node that two bones claim belongs to neither.
+    fn bones(&self, specs: &[BoneSpec], mesh: &TetMesh, rings: u32) -> Result<Vec<Bone>, SceneError> {
         self.text.names("bone", specs.iter().map(|b| &b.name))?;
         let mut owner: Vec<Option<&str>> = vec![None; mesh.nodes.len()];
+        let mut shared = vec![false; mesh.nodes.len()];
         let mut bones = Vec::new();
         for spec in specs {
             let wanted = spec.nodes.as_ref().unwrap_or(&spec.name);
@@ -203,9 +206,12 @@ impl Builder<'_> {
                 .node_set(wanted.get_ref())
                 .ok_or_else(|| self.text.unknown("node set", wanted, mesh.node_sets.iter().map(|s| s.name.as_str())))?;
             for &a in &set.nodes {
-                if let Some(other) = owner[a as usize].replace(spec.name.get_ref()) {
+                let Some(other) = owner[a as usize].replace(spec.name.get_ref()) else { continue };
+                shared[a as usize] = true;
+                if rings == 0 {
                     let message = format!(
-                        "bones `{other}` and `{}` both claim node {a}; a node can stick to one bone only",
+                        "bones `{other}` and `{}` both claim node {a}; a node can stick to one bone only: name other \
+                         sets, or let [attachment] free_rings = 1 set such nodes free",
                         spec.name.get_ref()
                     );
                     return Err(self.text.at(wanted.span().start, message));
@@ -219,6 +225,7 @@ impl Builder<'_> {
             };
             bones.push(Bone { name: spec.name.get_ref().clone(), nodes: set.nodes.clone(), drive });
         }
+        bones.iter_mut().for_each(|b| b.nodes.retain(|a| !shared[*a as usize]));
         Ok(bones)
     }
 

@@ -146,7 +146,7 @@ pub const KEYS: &[Key] = &[
     ),
     key("mesh", "head", "table", "", Any, "none", "The synthetic head."),
     key("mesh", "block", "table", "", Any, "none", "A box."),
-    key("mesh.head", "edge", "float", "m", From(0.002, 0.012), "0.007", "Edge of the lattice cell."),
+    key("mesh.head", "edge", "float", "m", From(0.002, 0.012), "0.0078", "Edge of the lattice cell."),
     key("mesh.block", "origin", "[float; 3]", "m", Any, "[0, 0, 0]", "Corner with the smallest coordinates."),
     key("mesh.block", "size", "[float; 3]", "m", Positive, "required", "Edge lengths."),
     key("mesh.block", "cells", "[integer; 3]", "", AtLeastOne, "required", "Cells along x, y and z."),
@@ -250,7 +250,7 @@ pub const KEYS: &[Key] = &[
         "",
         NonNegative,
         "0",
-        "Bone nodes within this many edges of another bone are set free (osteotomy lines, joints).",
+        "Bone nodes that two bones claim, or within this many edges of another bone, are set free (osteotomy lines, joints).",
     ),
     key(
         "solver",

@@ -15,6 +15,8 @@ use crate::solve::{Minimiser, Outcome, Problem};
 
 /// A step is cut into pieces no smaller than this part of it.
 const SMALLEST_PIECE: f64 = 1.0 / 64.0;
+/// A piece that turns elements inside out is cut, down to this part of the step; then it is taken and told.
+const SMALLEST_TO_AVOID_INVERSION: f64 = 1.0 / 8.0;
 /// After a piece that succeeded the next one may be this much larger.
 const GROWTH: f64 = 2.0;
 /// Change of ln dt beyond which the stiffness with inertia is factored anew.
@@ -140,7 +142,7 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
         work.before.copy_from(&work.config);
         let linearised_before = linearisation.clone();
         let t = state.t + to * dt;
-        match step_piece(model, work, &mut linearisation, t, dt * (to - done), &mut report) {
+        match step_piece(model, work, &mut linearisation, t, dt * (to - done), to - done, &mut report) {
             Ok(()) => {
                 report.substeps += 1;
                 done = to;
@@ -157,6 +159,9 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
         }
     }
     let strain = strain_of(model, &work.config.x);
+    if strain.min_det_f <= 0.0 && state.outputs.min_det_f > 0.0 {
+        report.warnings.push(format!("elements are turned inside out (smallest det F {:.3})", strain.min_det_f));
+    }
     warn_of_jumps(model, &state.config, &work.config, &mut report);
     state.t += dt;
     state.config.copy_from(&work.config);
@@ -202,6 +207,7 @@ fn step_piece(
     linearisation: &mut Option<Arc<Linearisation>>,
     t: f64,
     dt: f64,
+    piece: f64,
     report: &mut StepReport,
 ) -> Result<(), SolveError> {
     let parts = model.parts();
@@ -227,8 +233,9 @@ fn step_piece(
     report.iterations += 1;
     let outcome = minimiser.minimise(&problem, config)?;
     report.count(&outcome);
-    if !problem.is_quadratic() && !inverted_before && strain_of(model, &config.x).min_det_f <= 0.0 {
-        return Err(SolveError::NotFinite("the step would turn elements inside out"));
+    let inverts = || !problem.is_quadratic() && !inverted_before && strain_of(model, &config.x).min_det_f <= 0.0;
+    if piece > SMALLEST_TO_AVOID_INVERSION && inverts() {
+        return Err(SolveError::Inverts);
     }
     if outcome.factorisations > 0 {
         let made = Linearisation { config: minimiser.factored_at().clone(), t, dt, inputs: inputs.clone() };

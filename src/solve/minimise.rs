@@ -179,7 +179,7 @@ impl Minimiser {
         self.trial.copy_from(config);
         let mut energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
         if !energy.is_finite() {
-            return Err(SolveError::NotFinite("some element is inverted or a position is not a number"));
+            return Err(SolveError::NotFinite);
         }
         loop {
             let stale = newton && outcome.iterations > 0 && !problem.is_quadratic();

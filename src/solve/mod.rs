@@ -42,9 +42,12 @@ pub enum SolveError {
         /// Blocks in total.
         n_blocks: usize,
     },
-    /// The energy is not finite at the start of the step.
-    #[error("the energy is not finite where the step starts: {0}")]
-    NotFinite(&'static str),
+    /// The energy is not finite where the step starts.
+    #[error("the energy is not finite where the step starts: the bones move further than the tissue can follow")]
+    NotFinite,
+    /// The step would turn elements inside out; a smaller one may not.
+    #[error("the step would turn elements inside out")]
+    Inverts,
 }
 
 /// A solver for symmetric positive definite systems of 3x3 blocks.

@@ -1,0 +1,375 @@
+//! From a head CT to a mesh of the face: region, surfaces, bones, tetrahedra, slit, layers, and what to beware of.
+
+use std::fmt;
+
+use super::assemble::{Assembled, Bone, Kind, Naming, assemble};
+use super::clean::{crop, one_body, outer_air, solid_bones};
+use super::label::{LayerShare, Layers};
+use super::separate::{BONES, bone_map};
+use super::stuffing::{Side, Wall};
+use super::{
+    Cuboid, Distance, Field, Isosurface, Labels, Lattice, MeshReport, MeshingError, Nearest, Sizing, Surface, Volume, stuff,
+};
+use crate::math::Vec3;
+use crate::mesh::{SKIN, TetMesh};
+
+/// The face about the nose tip, m: to the right, in front, below; to the left, behind, above.
+const FACE: [[f64; 3]; 2] = [[-0.086, -0.006, -0.096], [0.086, 0.122, 0.082]];
+/// What is read round the region of interest, m, so that distances at its rim are right.
+const MARGIN: f64 = 0.010;
+/// Rim of the region left out of the distances reported, m: there the lattice meets the cut planes.
+const RIM: f64 = 0.005;
+/// Tissue thinner than this many lattice edges is warned of.
+const THIN: f64 = 2.0;
+/// Thin places are gathered over cells of this size, m; the worst ones are told.
+const THIN_CELL: f64 = 0.02;
+const THIN_TOLD: usize = 12;
+/// Hounsfield units below which tissue under the skin is fat.
+const FAT_HU: f64 = -10.0;
+/// Half width and half height of the mouth, and how far behind the front of the teeth the slit may reach, m.
+const MOUTH: [f64; 3] = [0.025, 0.018, 0.010];
+/// Search reach for the nearest bone, m.
+const REACH: f64 = 0.06;
+
+/// How to bake.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BakeOptions {
+    /// Threshold of the skin, HU.
+    pub skin_hu: f64,
+    /// Threshold of bone, HU.
+    pub bone_hu: f64,
+    /// Region of interest, corners in LPS metres; without one the face is found from the nose tip.
+    pub roi: Option<[Vec3; 2]>,
+    /// Lattice edge, m.
+    pub edge: f64,
+    /// Tissue layers by depth.
+    pub layers: Layers,
+    /// Whether Hounsfield units tell fat from muscle below the dermis.
+    pub fat_by_hu: bool,
+    /// Whether to cut the closed mouth along the oral slit.
+    pub slit: bool,
+    /// Box in which the slit may run, corners in LPS metres; without one it is found from the teeth.
+    pub mouth: Option<[Vec3; 2]>,
+}
+
+impl Default for BakeOptions {
+    fn default() -> Self {
+        Self {
+            skin_hu: -300.0,
+            bone_hu: 250.0,
+            roi: None,
+            edge: 4e-3,
+            layers: Layers::default(),
+            fat_by_hu: true,
+            slit: true,
+            mouth: None,
+        }
+    }
+}
+
+/// Something the user should know about a mesh that was made.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Warning {
+    /// Tissue thinner than the lattice resolves.
+    Thin {
+        /// Thinnest place, LPS, m.
+        place: Vec3,
+        /// Thickness there, m.
+        thickness: f64,
+        /// Skin area about it that is thinner than twice the edge, m2.
+        area: f64,
+    },
+    /// More thin places than were told one by one.
+    MoreThin {
+        /// How many.
+        places: usize,
+        /// Their skin area, m2.
+        area: f64,
+    },
+    /// Skull and mandible hang together: the jaw cannot move.
+    JawNotFound,
+    /// No slit was cut.
+    NoSlit,
+    /// Loose pieces that were left out.
+    Dropped {
+        /// How many.
+        pieces: usize,
+        /// Their volume, m3.
+        volume: f64,
+    },
+    /// A layer that the mesh is too coarse for.
+    Layer(LayerShare),
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Thin { place, thickness, area } => {
+                let p = place * 1e3;
+                let (t, a) = (thickness * 1e3, area * 1e4);
+                write!(f, "thin tissue: {t:.1} mm at ({:.1}, {:.1}, {:.1}) mm LPS, {a:.1} cm2 about it; it may be missing: choose a shorter edge", p.x, p.y, p.z)
+            }
+            Self::MoreThin { places, area } => write!(f, "thin tissue at {places} more places, {:.1} cm2", area * 1e4),
+            Self::JawNotFound => write!(f, "skull and mandible could not be told apart: all bone is `skull`; give a labels file"),
+            Self::NoSlit => write!(f, "no oral slit was cut: no faces between the jaws in the mouth's box; give the box of the mouth"),
+            Self::Dropped { pieces, volume } => write!(f, "{pieces} loose piece(s) of {:.2} mL left out", volume * 1e6),
+            Self::Layer(s) => write!(f, "layer `{}` takes {:.1} % of the volume, by depth it should take {:.1} %: choose a shorter edge", s.name, s.reached * 100.0, s.wanted * 100.0),
+        }
+    }
+}
+
+/// A mesh of the face and what is known about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Baked {
+    /// The mesh: node sets by bone; face sets `skin`, each bone, `cut`, `free`; regions by depth.
+    pub mesh: TetMesh,
+    /// What it is worth.
+    pub report: MeshReport,
+    /// What to beware of.
+    pub warnings: Vec<Warning>,
+    /// Share of the volume of each layer.
+    pub layers: Vec<LayerShare>,
+    /// Nodes doubled along the oral slit.
+    pub slit_nodes: usize,
+    /// Bone nodes released because a second bone is near.
+    pub released_nodes: usize,
+}
+
+/// Bakes the soft tissue of a face: inside the skin, outside the bones, inside the region of interest. `progress` is told
+/// each stage and the share of the work done.
+///
+/// # Errors
+/// [`MeshingError::EmptyIsosurface`] when a threshold is never passed, [`MeshingError::NoTissue`],
+/// [`MeshingError::Region`] when the region misses the volume, [`MeshingError::Mesh`] and the lattice's.
+pub fn bake(
+    volume: &Volume,
+    labels: Option<&Labels>,
+    options: &BakeOptions,
+    progress: &mut dyn FnMut(&str, f64),
+) -> Result<Baked, MeshingError> {
+    progress("region", 0.0);
+    let nose = nose_tip(volume, options)?;
+    let region = region(volume, options, &nose)?;
+    let mut part = part_of(volume, &region);
+    progress("surfaces", 0.05);
+    one_body(&mut part, options.skin_hu);
+    let first = Distance::to_isosurface(&part, options.bone_hu);
+    if first.surface.triangles.is_empty() {
+        return Err(empty("bone", options.bone_hu, &part));
+    }
+    solid_bones(&mut part, options.skin_hu, options.bone_hu, &first);
+    let to_bone = Distance::to_isosurface(&part, options.bone_hu);
+    let to_skin = Distance::to_isosurface(&part, options.skin_hu);
+    if to_skin.surface.triangles.is_empty() {
+        return Err(empty("skin", options.skin_hu, &part));
+    }
+    let outer = outer_air(&part, options.skin_hu, &to_skin);
+    progress("bones", 0.45);
+    let (map, told) = bone_map(&part, options.bone_hu, labels, &nose);
+    let bone_surfaces = split_bones(&part, &to_bone.surface, &map);
+    let bins: Vec<Nearest> = bone_surfaces.iter().map(|s| Nearest::new(s, 4e-3)).collect();
+    let to: Vec<_> = bins.iter().map(|b| move |p: &Vec3| b.distance(p, REACH).map_or(REACH, |d| d.0)).collect();
+    progress("tetrahedra", 0.55);
+    let skin = Isosurface { volume: &part, iso: options.skin_hu, distance: &to_skin };
+    let bone = Isosurface { volume: &part, iso: options.bone_hu, distance: &to_bone };
+    let walls = [
+        Wall { name: SKIN, field: &skin, side: Side::Inside },
+        Wall { name: "bone", field: &bone, side: Side::Outside },
+        Wall { name: "cut", field: &region, side: Side::Inside },
+    ];
+    let lattice = Lattice::over(&region, &super::Uniform(options.edge) as &dyn Sizing)?;
+    let stuffing = stuff(&walls, &lattice)?;
+    let repair = stuffing.repair;
+    progress("names", 0.7);
+    let mouth = mouth(options, &bone_surfaces, &nose, told);
+    let parts = |c: [Vec3; 3], a: Vec3, b: Vec3| {
+        let side = |p: &Vec3| to[1](p) < to[0](p);
+        mouth.is_some_and(|m| m.at(&((c[0] + c[1] + c[2]) / 3.0)) < 0.0) && side(&a) != side(&b)
+    };
+    let present: Vec<usize> = (0..BONES.len()).filter(|&k| !bone_surfaces[k].triangles.is_empty()).collect();
+    let bones: Vec<Bone> = present.iter().map(|&k| Bone { name: BONES[k], field: &to[k] }).collect();
+    let naming = Naming {
+        walls: &walls,
+        kinds: &[Kind::Skin, Kind::Bone, Kind::Cut],
+        bones: &bones,
+        edge: options.edge,
+        slit: mouth.is_some().then_some(&parts),
+        is_outer: &|p| outer[part.grid.index(part.grid.nearest(p))],
+    };
+    let Assembled { mut mesh, slit_nodes, released_nodes } = assemble(stuffing.mesh, &naming);
+    let depth = |p: &Vec3| (-to_skin.at(p), to_bone.at(p));
+    let fatty = |p: &Vec3| options.fat_by_hu.then(|| part.sample(p) < FAT_HU);
+    let layers = options.layers.label(&mut mesh, &depth, &fatty);
+    let mesh = mesh.checked()?;
+    progress("report", 0.8);
+    let mut report = MeshReport::of(&mesh, slit_nodes);
+    report.wanted_volume = Some(tissue_volume(&part, options, &region));
+    let inner = Cuboid { low: region.low + Vec3::repeat(RIM), high: region.high - Vec3::repeat(RIM) };
+    let outer_skin = outer_part(&to_skin.surface, &part, &outer);
+    report.measure_surface(&mesh, SKIN, &outer_skin, &inner);
+    for &k in present.iter().filter(|&&k| mesh.face_set(BONES[k]).is_some()) {
+        report.measure_surface(&mesh, BONES[k], &bone_surfaces[k], &inner);
+    }
+    let mut warnings = thin(&outer_skin, &to_bone, options.edge, &inner);
+    if !told {
+        warnings.push(Warning::JawNotFound);
+    }
+    if options.slit && slit_nodes == 0 {
+        warnings.push(Warning::NoSlit);
+    }
+    if repair.dropped_components > 0 {
+        warnings.push(Warning::Dropped { pieces: repair.dropped_components, volume: repair.dropped_volume });
+    }
+    let coarse = |s: &&LayerShare| (s.reached - s.wanted).abs() > 0.1 * s.wanted;
+    warnings.extend(layers.iter().filter(coarse).cloned().map(Warning::Layer));
+    progress("done", 1.0);
+    Ok(Baked { mesh, report, warnings, layers, slit_nodes, released_nodes })
+}
+
+fn empty(name: &'static str, iso: f64, volume: &Volume) -> MeshingError {
+    let (least, most) = volume.range();
+    MeshingError::EmptyIsosurface { name, iso, least: f64::from(least), most: f64::from(most) }
+}
+
+/// The foremost skin point of the volume: the tip of the nose, if the face is in it.
+fn nose_tip(volume: &Volume, options: &BakeOptions) -> Result<Vec3, MeshingError> {
+    let grid = &volume.grid;
+    let [nx, ny, _] = grid.dims;
+    let (number, sizes) = super::clean::components(grid, |at| f64::from(volume.samples[at]) >= options.skin_hu);
+    let largest = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k));
+    let Some(largest) = largest.filter(|&k| sizes[k] < grid.len()) else {
+        return Err(empty("skin", options.skin_hu, volume));
+    };
+    let body = (0..grid.len()).filter(|&at| number[at] as usize == largest + 1);
+    let place = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
+    let foremost = body.map(place).min_by(|p, q| p.y.total_cmp(&q.y));
+    foremost.ok_or_else(|| empty("skin", options.skin_hu, volume))
+}
+
+/// The region of interest, inside the volume.
+fn region(volume: &Volume, options: &BakeOptions, nose: &Vec3) -> Result<Cuboid, MeshingError> {
+    let [low, high] = volume.grid.bounds();
+    let [from, to] = options.roi.unwrap_or(FACE.map(|c| nose + Vec3::from(c)));
+    let region = Cuboid { low: from.inf(&to).sup(&low), high: from.sup(&to).inf(&high) };
+    if (region.high - region.low).min() < 2.0 * options.edge {
+        return Err(MeshingError::Region { region: [from.into(), to.into()], volume: [low.into(), high.into()] });
+    }
+    Ok(region)
+}
+
+/// The samples of a volume in and round a region.
+fn part_of(volume: &Volume, region: &Cuboid) -> Volume {
+    let grid = &volume.grid;
+    let far = Vec3::repeat(f64::INFINITY);
+    let (low, high) = (0..8).fold((far, -far), |(low, high), corner| {
+        let p = Vec3::from_fn(|a, _| if corner >> a & 1 == 0 { region.low[a] - MARGIN } else { region.high[a] + MARGIN });
+        let c = grid.coordinates(&p);
+        (low.inf(&c), high.sup(&c))
+    });
+    let bound = |c: f64, a: usize| c.clamp(0.0, grid.dims[a] as f64 - 1.0) as usize;
+    crop(volume, [0, 1, 2].map(|a| bound(low[a].floor(), a)), [0, 1, 2].map(|a| bound(high[a].ceil(), a)))
+}
+
+/// The triangles of each bone, by the bone of the nearest bone sample.
+fn split_bones(part: &Volume, surface: &Surface, map: &[u8]) -> [Surface; 3] {
+    let grid = &part.grid;
+    let bone_at = |t: usize| {
+        let corners = surface.corners(t);
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let ([i, j, k], _) = grid.cell(&middle);
+        let around = (0..8).map(|c| grid.index([i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1)]));
+        let distance = |at: usize| {
+            let [nx, ny, _] = grid.dims;
+            let p = grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
+            (p - middle).norm_squared()
+        };
+        let nearest = around.filter(|&at| map[at] != 0).min_by(|&p, &q| distance(p).total_cmp(&distance(q)));
+        nearest.map_or(0, |at| usize::from(map[at]) - 1)
+    };
+    let mut parts: [Surface; 3] = std::array::from_fn(|_| Surface::default());
+    for t in 0..surface.triangles.len() {
+        parts[bone_at(t)].triangles.push(surface.triangles[t]);
+    }
+    parts.map(|p| compacted(surface, p.triangles))
+}
+
+/// A part of a surface with only the vertices it uses.
+fn compacted(surface: &Surface, mut triangles: Vec<[u32; 3]>) -> Surface {
+    let mut new = vec![u32::MAX; surface.vertices.len()];
+    let mut vertices = Vec::new();
+    for a in triangles.iter_mut().flatten() {
+        let n = &mut new[*a as usize];
+        if *n == u32::MAX {
+            *n = vertices.len() as u32;
+            vertices.push(surface.vertices[*a as usize]);
+        }
+        *a = *n;
+    }
+    Surface { vertices, triangles }
+}
+
+fn outer_part(surface: &Surface, part: &Volume, outer: &[bool]) -> Surface {
+    let is_outer = |t: &[u32; 3]| outer[part.grid.index(part.grid.nearest(&surface.vertices[t[0] as usize]))];
+    compacted(surface, surface.triangles.iter().filter(|t| is_outer(t)).copied().collect())
+}
+
+/// The box of the mouth: given, or about the front teeth, where skull and mandible come nearest near the median plane.
+fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, told: bool) -> Option<Cuboid> {
+    if !options.slit || !told {
+        return None;
+    }
+    if let Some([a, b]) = options.mouth {
+        return Some(Cuboid { low: a.inf(&b), high: a.sup(&b) });
+    }
+    let near = |p: &&Vec3| (p.x - nose.x).abs() < 0.012 && p.z < nose.z - 0.012 && p.z > nose.z - 0.085;
+    let front = |s: &Surface| s.vertices.iter().filter(near).map(|p| p.y).fold(f64::INFINITY, f64::min);
+    let teeth = |s: &Surface, y: f64| s.vertices.iter().filter(near).filter(|p| p.y < y + 0.012).map(|p| p.z).collect::<Vec<_>>();
+    let (upper_y, lower_y) = (front(&bones[0]), front(&bones[1]));
+    let upper = teeth(&bones[0], upper_y).into_iter().fold(f64::INFINITY, f64::min);
+    let lower = teeth(&bones[1], lower_y).into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let z = 0.5 * (upper + lower);
+    if !z.is_finite() {
+        return None;
+    }
+    let back = upper_y.max(lower_y) + MOUTH[2];
+    let low = Vec3::new(nose.x - MOUTH[0], nose.y - 0.02, z - MOUTH[1]);
+    Some(Cuboid { low, high: Vec3::new(nose.x + MOUTH[0], back, z + MOUTH[1]) })
+}
+
+/// Volume of the samples between the thresholds inside the region, m3.
+fn tissue_volume(part: &Volume, options: &BakeOptions, region: &Cuboid) -> f64 {
+    let grid = &part.grid;
+    let [nx, ny, _] = grid.dims;
+    let tissue = |at: &usize| (options.skin_hu..options.bone_hu).contains(&f64::from(part.samples[*at]));
+    let place = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
+    let inside = (0..grid.len()).filter(tissue).filter(|&at| region.at(&place(at)) <= 0.0).count();
+    inside as f64 * grid.spacing.product()
+}
+
+/// Places where the way from skin to bone is shorter than the lattice resolves, worst first.
+fn thin(skin: &Surface, to_bone: &Distance, edge: f64, within: &Cuboid) -> Vec<Warning> {
+    let mut cells: std::collections::BTreeMap<[i64; 3], (f64, Vec3, f64)> = std::collections::BTreeMap::new();
+    for t in 0..skin.triangles.len() {
+        let corners = skin.corners(t);
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let thickness = to_bone.at(&middle);
+        if thickness >= THIN * edge || within.at(&middle) > 0.0 {
+            continue;
+        }
+        let key = [0, 1, 2].map(|a| (middle[a] / THIN_CELL).floor() as i64);
+        let cell = cells.entry(key).or_insert((f64::INFINITY, middle, 0.0));
+        cell.2 += super::doubled_area(corners).norm() / 2.0;
+        if thickness < cell.0 {
+            (cell.0, cell.1) = (thickness, middle);
+        }
+    }
+    let mut places: Vec<(f64, Vec3, f64)> = cells.into_values().collect();
+    places.sort_by(|p, q| p.0.total_cmp(&q.0));
+    let rest = places.split_off(places.len().min(THIN_TOLD));
+    let tell = |(thickness, place, area): (f64, Vec3, f64)| Warning::Thin { place, thickness: thickness.max(0.0), area };
+    let mut warnings: Vec<Warning> = places.into_iter().map(tell).collect();
+    if !rest.is_empty() {
+        warnings.push(Warning::MoreThin { places: rest.len(), area: rest.iter().map(|p| p.2).sum() });
+    }
+    warnings
+}

@@ -1,0 +1,85 @@
+//! Real heads: from the CT to named tetrahedra, with and without labels, and what bad volumes are told.
+use cutis::geometry::{BakeOptions, Baked, MeshingError, Volume, Warning, bake};
+use cutis::io::{read_labels, read_volume, write_mesh};
+
+use super::ct_files::data;
+use super::stuffing::DIHEDRAL;
+
+fn run(volume: &Volume, labels: Option<&cutis::geometry::Labels>, options: &BakeOptions, name: &str) -> Baked {
+    let start = std::time::Instant::now();
+    let mut stages = Vec::new();
+    let baked = bake(volume, labels, options, &mut |stage, share| {
+        stages.push((stage.to_string(), share, start.elapsed().as_secs_f64()))
+    })
+    .unwrap();
+    println!("== {name}\n{}{} slit nodes, {} released", baked.report, baked.slit_nodes, baked.released_nodes);
+    stages.iter().for_each(|(stage, _, t)| println!("{t:6.2} s {stage}"));
+    baked.warnings.iter().for_each(|w| println!("warning: {w}"));
+    for s in &baked.mesh.node_sets {
+        println!("node set {} {}", s.name, s.nodes.len());
+    }
+    for s in &baked.mesh.face_sets {
+        println!("face set {} {}", s.name, s.triangles.len());
+    }
+    assert!(stages.windows(2).all(|w| w[0].1 <= w[1].1));
+    write_mesh(&super::mesh_files::scratch(&format!("{name}.cutis")), &baked.mesh).unwrap();
+    let r = &baked.report;
+    assert!(r.is_sound(), "{r}");
+    assert!(r.dihedral[0] >= DIHEDRAL[0] && r.dihedral[1] <= DIHEDRAL[1], "{r}");
+    let faces: usize = baked.mesh.face_sets.iter().map(|s| s.triangles.len()).sum();
+    assert_eq!(faces, baked.mesh.boundary().len());
+    baked
+}
+
+fn count(baked: &Baked, name: &str) -> usize {
+    baked.mesh.node_set(name).map_or(0, |s| s.nodes.len())
+}
+
+#[test]
+fn clean_head_with_labels_in_release() {
+    let (Some(head), Some(labels)) = (data("cthead_unc_clean.nii.gz"), data("cthead_unc_labels.nii.gz")) else { return };
+    let (volume, labels) = (read_volume(&head).unwrap(), read_labels(&labels).unwrap());
+    let baked = run(&volume, Some(&labels), &BakeOptions::default(), "clean_labels");
+    assert!(count(&baked, "skull") > 1000 && count(&baked, "mandible") > 500);
+    assert!(baked.slit_nodes > 10);
+    assert!(!baked.warnings.contains(&Warning::JawNotFound));
+}
+
+#[test]
+fn clean_head_without_labels_in_release() {
+    let Some(head) = data("cthead_unc_clean.nii.gz") else { return };
+    let volume = read_volume(&head).unwrap();
+    let options = BakeOptions { edge: 5e-3, ..BakeOptions::default() };
+    let baked = run(&volume, None, &options, "clean_bare");
+    assert!(count(&baked, "skull") > 500 && count(&baked, "mandible") > 300);
+    assert!(baked.warnings.iter().any(|w| matches!(w, Warning::Thin { .. })));
+    let again = bake(&volume, None, &options, &mut |_, _| {}).unwrap();
+    assert_eq!(again.mesh, baked.mesh);
+}
+
+#[test]
+fn coarse_head_of_two_millimetres() {
+    let Some(head) = data("cthead_unc_2mm.nrrd") else { return };
+    let volume = read_volume(&head).unwrap();
+    let options = BakeOptions { edge: 6e-3, ..BakeOptions::default() };
+    let baked = run(&volume, None, &options, "coarse");
+    assert!(count(&baked, "skull") > 300);
+}
+
+#[test]
+fn bad_volumes_are_told() {
+    let Some(head) = data("vtk_headsq_quarter.nrrd") else { return };
+    let volume = read_volume(&head).unwrap();
+    let refused = |change: &dyn Fn(&mut f32), options: &BakeOptions| {
+        let mut v = volume.clone();
+        v.samples.iter_mut().for_each(change);
+        bake(&v, None, options, &mut |_, _| {}).unwrap_err()
+    };
+    let plain = BakeOptions { edge: 6e-3, ..BakeOptions::default() };
+    let offset = refused(&|s| *s += 1024.0, &plain);
+    assert!(matches!(offset, MeshingError::EmptyIsosurface { name: "skin", .. }), "{offset}");
+    let soft = refused(&|s| *s = s.min(200.0), &plain);
+    assert!(matches!(soft, MeshingError::EmptyIsosurface { name: "bone", .. }), "{soft}");
+    let far = BakeOptions { roi: Some([nalgebra::Vector3::repeat(5.0), nalgebra::Vector3::repeat(5.1)]), ..plain.clone() };
+    assert!(matches!(refused(&|_| {}, &far), MeshingError::Region { .. }));
+}
