@@ -53,6 +53,7 @@ pub fn package(scene: &Loaded, baked: &Baked, binary: &[u8], version: FmiVersion
     archive.add("documentation/licenses/license.txt", 0o644, LICENSE.as_bytes())?;
     archive.add("documentation/licenses/LICENSE-APACHE", 0o644, include_bytes!("../../LICENSE-APACHE"))?;
     archive.add("documentation/licenses/LICENSE-MIT", 0o644, include_bytes!("../../LICENSE-MIT"))?;
+    archive.add("documentation/licenses/third-party.txt", 0o644, include_bytes!("../../fmu/third-party.txt"))?;
     archive.add("resources/model.cutis", 0o644, &baked.mesh)?;
     archive.add("resources/scene.toml", 0o644, baked.scene.as_bytes())?;
     if version == FmiVersion::V3 {
@@ -64,7 +65,7 @@ pub fn package(scene: &Loaded, baked: &Baked, binary: &[u8], version: FmiVersion
 const LICENSE: &str = "This component is licensed under either of the MIT license (LICENSE-MIT) or the Apache license 2.0 (LICENSE-APACHE),
 at your option. SPDX: MIT OR Apache-2.0
 
-It contains Rust libraries under MIT, Apache-2.0, BSD, Zlib and compatible licenses; Cargo.lock of the source names them.
+The libraries inside it and their licenses are listed in third-party.txt.
 ";
 
 struct Archive(ZipWriter<Cursor<Vec<u8>>>);

@@ -1,4 +1,5 @@
-/* Every function of both FMI headers, called with nothing, in every order: an answer or an error, never a crash. */
+/* Every function of both FMI headers, called with nothing, in every order: an answer or an error, never a crash.
+ * Arguments: a scene file that is alone in its folder, and the list of functions. */
 #include <dlfcn.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -68,6 +69,7 @@ static void tell2(void *environment, const char *name, int status, const char *c
     ++logged;
 }
 
+static char folder[1024], uri[1100];
 static char names[256][64];
 static AnyCall calls[256];
 static int n_calls = 0;
@@ -92,7 +94,7 @@ static void read_names(const char *path) {
 }
 
 static void *three(const char *token, int on) {
-    return fmi3InstantiateCoSimulation("three", token, NULL, 0, (uint8_t)on, 0, 0, NULL, 0, &logged, tell3, NULL);
+    return fmi3InstantiateCoSimulation("three", token, folder, 0, (uint8_t)on, 0, 0, NULL, 0, &logged, tell3, NULL);
 }
 
 static void instantiation(const char *token) {
@@ -102,15 +104,15 @@ static void instantiation(const char *token) {
     CHECK(three("{wrong}", 1) == NULL && logged == 1);
     CHECK(three("{wrong}", 0) == NULL && logged == 1);
     CHECK(three(NULL, 1) == NULL);
-    CHECK(fmi3InstantiateCoSimulation("", token, NULL, 0, 1, 0, 0, NULL, 0, &logged, tell3, NULL) == NULL);
-    CHECK(fmi3InstantiateCoSimulation(NULL, token, NULL, 0, 1, 0, 0, NULL, 0, &logged, tell3, NULL) == NULL);
-    CHECK(fmi3InstantiateCoSimulation("a", token, NULL, 0, 1, 1, 0, NULL, 0, &logged, tell3, NULL) == NULL);
-    CHECK(fmi3InstantiateCoSimulation("a", "{wrong}", NULL, 0, 1, 0, 0, NULL, 0, NULL, NULL, NULL) == NULL);
+    CHECK(fmi3InstantiateCoSimulation("", token, folder, 0, 1, 0, 0, NULL, 0, &logged, tell3, NULL) == NULL);
+    CHECK(fmi3InstantiateCoSimulation(NULL, token, folder, 0, 1, 0, 0, NULL, 0, &logged, tell3, NULL) == NULL);
+    CHECK(fmi3InstantiateCoSimulation("a", token, folder, 0, 1, 1, 0, NULL, 0, &logged, tell3, NULL) == NULL);
+    CHECK(fmi3InstantiateCoSimulation("a", "{wrong}", folder, 0, 1, 0, 0, NULL, 0, NULL, NULL, NULL) == NULL);
     CHECK(fmi3InstantiateModelExchange("a", token, NULL, 0, 1, &logged, tell3) == NULL);
     CHECK(logged == 6);
-    CHECK(fmi2Instantiate("two", 1, token, NULL, NULL, 0, 1) == NULL);
+    CHECK(fmi2Instantiate("two", 1, token, uri, NULL, 0, 1) == NULL);
     CHECK(fmi2Instantiate("two", 0, token, NULL, &functions, 0, 1) == NULL);
-    CHECK(fmi2Instantiate("two", 1, "{wrong}", NULL, &functions, 0, 1) == NULL);
+    CHECK(fmi2Instantiate("two", 1, "{wrong}", uri, &functions, 0, 1) == NULL);
     CHECK(fmi2Instantiate("two", 1, token, "http://example.org/x", &functions, 0, 1) == NULL);
     CHECK(logged == 9);
     fmi3FreeInstance(NULL);
@@ -164,7 +166,7 @@ static void anything(const char *token) {
     int i, k;
     functions.environment = &logged;
     for (i = 0; i < n_calls; ++i) CHECK(calls[i](NULL, 0, 0, 0, 0, 0, 0, 0, 0) == ERROR);
-    instance[0] = fmi2Instantiate("two", 1, token, "", &functions, 0, 0);
+    instance[0] = fmi2Instantiate("two", 1, token, uri, &functions, 0, 0);
     instance[1] = three(token, 1);
     CHECK(instance[0] != NULL && instance[1] != NULL);
     for (k = 0; k < ORDERS; ++k) {
@@ -202,16 +204,20 @@ static void anything(const char *token) {
 }
 
 int main(int argc, char **argv) {
-    char token[256] = "", path[1024];
+    char token[256] = "", why[512] = "";
     const char *slash;
-    CutisSim *sim = cutis_sim_new_default(NULL, 0);
-    CHECK(sim != NULL && cutis_sim_token(sim, token, sizeof token) > 1);
+    CutisSim *sim;
+    if (argc < 3 || strlen(argv[1]) > 1000 || (slash = strrchr(argv[1], '/')) == NULL) return 2;
+    sim = cutis_sim_new_from_file(argv[1], why, sizeof why);
+    if (sim == NULL) {
+        printf("misuse: %s\n", why);
+        return 2;
+    }
+    CHECK(cutis_sim_token(sim, token, sizeof token) > 1);
     cutis_sim_free(sim);
-    /* argv[1] is fmu/scene.toml; the list lies beside this file. */
-    slash = argc > 1 ? strrchr(argv[1], '/') : NULL;
-    if (slash == NULL || slash - argv[1] > 900) return 2;
-    sprintf(path, "%.*s/../tests/c/fmi_functions.txt", (int)(slash - argv[1]), argv[1]);
-    read_names(path);
+    sprintf(folder, "%.*s/", (int)(slash - argv[1]), argv[1]);
+    sprintf(uri, "file://%s", folder);
+    read_names(argv[2]);
     instantiation(token);
     states(token);
     anything(token);
