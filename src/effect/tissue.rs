@@ -1,14 +1,22 @@
-//! Elastic tissue: linear tetrahedra of one region and one law; the catalogue of laws.
+//! Elastic tissue: tetrahedra of one material; the catalogue of laws.
 
 use crate::energy::{
     Corotational, Energy, Fung, Isochoric, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, Principal, StVenantKirchhoff,
     StableNeoHookean, Stretches, VerondaWestmann, WithBulk, Yeoh,
 };
-use crate::fem::{OnElements, Term, Tet4};
+use crate::fem::{OnElements, Term, Tet4, Tet10};
 use crate::math::Vec3;
 
-/// Tetrahedra of rest positions that become a term.
-pub type Tets<'a> = (&'a [Vec3], &'a mut dyn Iterator<Item = [u32; 4]>);
+/// The elements of a tissue.
+#[derive(Clone, Copy)]
+pub struct Elements<'a> {
+    /// Rest positions of all nodes, m.
+    pub X: &'a [Vec3],
+    /// Corners of each tetrahedron.
+    pub tets: &'a [[u32; 4]],
+    /// Mid-edge nodes of each tetrahedron; empty for linear elements.
+    pub midsides: &'a [[u32; 6]],
+}
 
 /// An elastic law that a scene can choose.
 pub struct Law {
@@ -19,11 +27,16 @@ pub struct Law {
     /// Lame's constants at small strain, Pa.
     pub moduli: fn(&[Vec<f64>]) -> Lame,
     /// The tissue as a term.
-    pub term: fn(&[Vec<f64>], Tets) -> Box<dyn Term>,
+    pub term: fn(&[Vec<f64>], Elements) -> Box<dyn Term>,
 }
 
-fn term<M: Energy + 'static>(material: M, (X, tets): Tets) -> Box<dyn Term> {
-    Box::new(OnElements(Tet4::new(material, X, tets)))
+fn term<M: Energy + 'static>(material: M, elements: Elements) -> Box<dyn Term> {
+    let Elements { X, tets, midsides } = elements;
+    if midsides.is_empty() {
+        return Box::new(OnElements(Tet4::new(material, X, tets.iter().copied())));
+    }
+    let ten = |(t, m): (&[u32; 4], &[u32; 6])| std::array::from_fn(|k| if k < 4 { t[k] } else { m[k - 4] });
+    Box::new(OnElements(Tet10::new(material, X, tets.iter().zip(midsides).map(ten))))
 }
 
 fn lame(c: &[Vec<f64>]) -> Lame {
@@ -36,7 +49,7 @@ fn with_bulk(mu: f64, c: &[Vec<f64>]) -> Lame {
     Lame { mu, lambda: kappa - 2.0 / 3.0 * mu }
 }
 
-fn bulk<L: Isochoric + 'static>(law: L, c: &[Vec<f64>], tets: Tets) -> Box<dyn Term> {
+fn bulk<L: Isochoric + 'static>(law: L, c: &[Vec<f64>], tets: Elements) -> Box<dyn Term> {
     term(WithBulk { law, kappa: c[c.len() - 1][0] }, tets)
 }
 

@@ -6,9 +6,9 @@ use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile, TissueSpec};
 use super::keys::find;
 use super::place::{area_shares, nearest_point, patch, volume_shares};
 use super::programme::{Programme, Track};
-use crate::effect::{self, DeadLoad, Gravity, Inertia, Law, Pressure, lumped_masses};
+use crate::effect::{self, DeadLoad, Elements, Gravity, Inertia, Law, Pressure, lumped_masses};
 use crate::energy::Lame;
-use crate::fem::Term;
+use crate::fem::{Term, add_midsides};
 use crate::math::Vec3;
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::{Causality, Port, Slot};
@@ -35,11 +35,11 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn build(&self, file: &SceneFile, mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
+    fn build(&self, file: &SceneFile, mut mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
         // Exhaustive, so that a new table cannot be forgotten here.
         let SceneFile {
             name,
-            mesh: _,
+            mesh: mesh_spec,
             tissue: _,
             bone,
             load,
@@ -53,7 +53,16 @@ impl Builder<'_> {
             keyframe: _,
         } = file;
         let mut warnings = Vec::new();
-        let (mut terms, density) = self.tissue(file, &mesh, &mut warnings)?;
+        let order = mesh_spec.get_ref().order.as_ref();
+        let midsides = match order.map_or(1, |o| *o.get_ref()) {
+            1 => Vec::new(),
+            2 => add_midsides(&mut mesh),
+            found => {
+                let at = order.map_or(0, |o| o.span().start);
+                return Err(self.text.at(at, format!("`order` of [mesh] is {found}; wanted 1 or 2")));
+            }
+        };
+        let (mut terms, density) = self.tissue(file, &mesh, &midsides, &mut warnings)?;
         let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
         let mut bones = self.bones(bone, &mesh, rings)?;
         if rings > 0 {
@@ -77,7 +86,7 @@ impl Builder<'_> {
             terms.push(Box::new(self.pressure(spec, &mesh, input)?));
             start[input] = self.text.number("pressure", "pressure", &spec.pressure)?.unwrap_or(0.0);
         }
-        let masses = || lumped_masses(&mesh, &density);
+        let masses = || lumped_masses(&mesh, &midsides, &density);
         if let Some(spec) = gravity {
             let input = layout.first(Slot::Gravity).expect("a scene with gravity has its port");
             let g = self.text.triple("gravity", "acceleration", &spec.acceleration)?.unwrap_or([0.0, 0.0, -9.80665]);
@@ -120,6 +129,7 @@ impl Builder<'_> {
         let model = Model::new(ModelParts {
             name: name.clone().unwrap_or_else(|| "scene".into()),
             mesh,
+            midsides,
             bones,
             loads,
             pressures,
@@ -145,6 +155,7 @@ impl Builder<'_> {
         &self,
         file: &SceneFile,
         mesh: &TetMesh,
+        midsides: &[[u32; 6]],
         warnings: &mut Vec<String>,
     ) -> Result<(Vec<Box<dyn Term>>, Vec<f64>), SceneError> {
         let mut material = vec![usize::MAX; mesh.region_names.len()];
@@ -176,18 +187,19 @@ impl Builder<'_> {
             let Lame { mu, lambda } = (law.moduli)(&constants);
             let nu = lambda / (2.0 * (lambda + mu));
             let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
-            if nu > LOCKING_NU {
+            if nu > LOCKING_NU && midsides.is_empty() {
                 warnings.push(format!(
                     "Poisson's ratio {nu:.4} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too \
-                     small and forces too large"
+                     small and forces too large; [mesh] order = 2 does not"
                 ));
             }
             let mine = |r: u32| material[r as usize] == k;
             density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
-            let tets = mesh.tets.iter().zip(&mesh.region).filter(|(_, r)| mine(**r)).map(|(t, _)| *t);
-            if tets.clone().next().is_some() {
-                let mut tets = tets;
-                terms.push((law.term)(&constants, (&mesh.nodes, &mut tets)));
+            let elements: Vec<usize> = (0..mesh.tets.len()).filter(|&e| mine(mesh.region[e])).collect();
+            if !elements.is_empty() {
+                let tets: Vec<[u32; 4]> = elements.iter().map(|&e| mesh.tets[e]).collect();
+                let midsides: Vec<[u32; 6]> = elements.iter().filter_map(|&e| midsides.get(e).copied()).collect();
+                terms.push((law.term)(&constants, Elements { X: &mesh.nodes, tets: &tets, midsides: &midsides }));
             }
         }
         Ok((terms, density))

@@ -39,6 +39,7 @@ pub struct MeshSpec {
     pub file: Option<String>,
     pub head: Option<HeadSpec>,
     pub block: Option<BlockSpec>,
+    pub order: Option<Spanned<u32>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
