@@ -75,8 +75,7 @@ pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
     let mut values = vec![f32::INFINITY; grid.len()];
     let reach = grid.spacing.map(|s| BAND * s);
     // Grid coordinates in metres: the axes are orthonormal, so distances are kept.
-    let local: Vec<Vec3> =
-        surface.vertices.iter().map(|v| grid.coordinates(v).component_mul(&grid.spacing)).collect();
+    let local: Vec<Vec3> = surface.vertices.iter().map(|v| grid.coordinates(v).component_mul(&grid.spacing)).collect();
     for t in &surface.triangles {
         let corners = t.map(|a| local[a as usize]);
         let low = corners[0].inf(&corners[1]).inf(&corners[2]) - reach;

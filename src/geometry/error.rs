@@ -14,7 +14,9 @@ pub enum MeshingError {
         found: f64,
     },
     /// More elements than the 32-bit node numbers of a mesh can hold.
-    #[error("{what} would need {found} nodes, more than the {limit} that fit a mesh; choose fewer cells or a longer edge")]
+    #[error(
+        "{what} would need {found} nodes, more than the {limit} that fit a mesh; choose fewer cells or a longer edge"
+    )]
     TooLarge {
         /// What was asked for.
         what: String,
@@ -24,7 +26,9 @@ pub enum MeshingError {
         limit: u64,
     },
     /// Layer fractions that do not fill a block.
-    #[error("layer `{name}` brings the sum of the layer fractions to {sum}; each must be positive and the sum at most 1")]
+    #[error(
+        "layer `{name}` brings the sum of the layer fractions to {sum}; each must be positive and the sum at most 1"
+    )]
     Layers {
         /// Name of the first layer that does not fit.
         name: String,
@@ -40,7 +44,9 @@ pub enum MeshingError {
         edge: f64,
     },
     /// A threshold that the volume never passes.
-    #[error("no {name} surface at {iso} HU: the samples range from {least} to {most}; check that the file is a CT in Hounsfield units (air -1000, water 0: an offset of 1024 is common) and the threshold")]
+    #[error(
+        "no {name} surface at {iso} HU: the samples range from {least} to {most}; check that the file is a CT in Hounsfield units (air -1000, water 0: an offset of 1024 is common) and the threshold"
+    )]
     EmptyIsosurface {
         /// "skin" or "bone".
         name: &'static str,
@@ -52,12 +58,32 @@ pub enum MeshingError {
         most: f64,
     },
     /// A region of interest that does not meet the volume.
-    #[error("the region of interest {region:.3?} m does not overlap the volume {volume:.3?} m by two lattice edges; give it in LPS coordinates of the scan")]
+    #[error(
+        "the region of interest {region:.3?} m does not overlap the volume {volume:.3?} m by two lattice edges; give it in LPS coordinates of the scan"
+    )]
     Region {
         /// Corners asked for, LPS, m.
         region: [[f64; 3]; 2],
         /// Corners of the volume, LPS, m.
         volume: [[f64; 3]; 2],
+    },
+    /// Thresholds the wrong way round.
+    #[error("the skin threshold ({skin} HU) must lie below the bone threshold ({bone} HU); -300 and 250 are usual")]
+    Thresholds {
+        /// Skin threshold, HU.
+        skin: f64,
+        /// Bone threshold, HU.
+        bone: f64,
+    },
+    /// Labels of another place.
+    #[error(
+        "the labels {labels:.3?} m do not cover the region to mesh {region:.3?} m (LPS); give the labels of this scan"
+    )]
+    Labels {
+        /// Corners of the region, LPS, m.
+        region: [[f64; 3]; 2],
+        /// Corners of the labels, LPS, m.
+        labels: [[f64; 3]; 2],
     },
     /// The finished mesh broke a rule every mesh keeps.
     #[error(transparent)]

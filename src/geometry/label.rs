@@ -67,7 +67,13 @@ impl Layers {
         let layer = |p: &Vec3| {
             let (d_skin, d_bone) = depth(p);
             match (self.of(d_skin, d_bone), fatty(p)) {
-                (1 | 2, Some(fat)) => if fat { 1 } else { 2 },
+                (1 | 2, Some(fat)) => {
+                    if fat {
+                        1
+                    } else {
+                        2
+                    }
+                }
                 (layer, _) => layer,
             }
         };

@@ -115,12 +115,10 @@ impl Walker<'_> {
         while loop_.len() > 3 {
             let n = loop_.len();
             let position = |k: usize| self.surface.vertices[loop_[k % n] as usize];
-            let ear = (0..n)
-                .filter(|&k| faces_of(slots[k]) & faces_of(slots[(k + 2) % n]) == 0)
-                .min_by(|&p, &q| {
-                    let length = |k: usize| (position(k) - position(k + 2)).norm_squared();
-                    length(p).total_cmp(&length(q))
-                });
+            let ear = (0..n).filter(|&k| faces_of(slots[k]) & faces_of(slots[(k + 2) % n]) == 0).min_by(|&p, &q| {
+                let length = |k: usize| (position(k) - position(k + 2)).norm_squared();
+                length(p).total_cmp(&length(q))
+            });
             let Some(k) = ear else { break };
             self.triangle([loop_[k], loop_[(k + 1) % n], loop_[(k + 2) % n]]);
             slots.remove((k + 1) % n);

@@ -20,7 +20,8 @@ impl<'a> Nearest<'a> {
         let far = Vec3::repeat(f64::INFINITY);
         let (low, high) = surface.vertices.iter().fold((far, -far), |(l, h), v| (l.inf(v), h.sup(v)));
         let dims = [0, 1, 2].map(|a| if high[a] >= low[a] { ((high[a] - low[a]) / cell) as usize + 1 } else { 1 });
-        let mut bins = Self { surface, low, cell, dims, begin: vec![0; dims.iter().product::<usize>() + 1], items: Vec::new() };
+        let mut bins =
+            Self { surface, low, cell, dims, begin: vec![0; dims.iter().product::<usize>() + 1], items: Vec::new() };
         for fill in [false, true] {
             let mut place = bins.begin.clone();
             for t in 0..surface.triangles.len() {
@@ -60,7 +61,8 @@ impl<'a> Nearest<'a> {
         let centre = self.bin(p);
         // A point outside the bins looks at them from the nearest bin: its offset only makes rings later.
         let mut best: Option<(f64, usize)> = None;
-        let outside = (0..3).map(|a| (self.low[a] - p[a]).max(p[a] - self.low[a] - self.cell * self.dims[a] as f64).max(0.0));
+        let outside =
+            (0..3).map(|a| (self.low[a] - p[a]).max(p[a] - self.low[a] - self.cell * self.dims[a] as f64).max(0.0));
         let gap = outside.fold(0.0, f64::max);
         for ring in 0..*self.dims.iter().max().unwrap_or(&1) {
             let bound = best.map_or(reach, |b| b.0);

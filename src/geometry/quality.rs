@@ -95,7 +95,9 @@ impl MeshReport {
         let mut wanted = vec![false; mesh.nodes.len()];
         faces.iter().for_each(|(t, _)| t.iter().for_each(|&a| wanted[a as usize] = true));
         let (begin, items) = stars(&mesh.tets, mesh.nodes.len(), &wanted);
-        let pinched = |a: &usize| fans(&items[begin[*a] as usize..begin[*a + 1] as usize], *a as u32, &mesh.tets, &adjacent).1 > 1;
+        let pinched = |a: &usize| {
+            fans(&items[begin[*a] as usize..begin[*a + 1] as usize], *a as u32, &mesh.tets, &adjacent).1 > 1
+        };
         report.pinched_nodes = (0..mesh.nodes.len()).filter(|&a| wanted[a]).filter(pinched).count();
         report
     }
@@ -199,15 +201,26 @@ impl fmt::Display for MeshReport {
         let [least, most] = self.dihedral;
         let [r0, r1, r50] = self.radius_ratio;
         writeln!(f, "nodes {}  tetrahedra {}  components {}", self.nodes, self.tets, self.components)?;
-        writeln!(f, "inverted {}  degenerate {}  duplicate nodes {}", self.inverted, self.degenerate, self.duplicate_nodes)?;
+        writeln!(
+            f,
+            "inverted {}  degenerate {}  duplicate nodes {}",
+            self.inverted, self.degenerate, self.duplicate_nodes
+        )?;
         writeln!(f, "pinched boundary edges {}  nodes {}", self.pinched_edges, self.pinched_nodes)?;
-        writeln!(f, "dihedral {least:.1} .. {most:.1} degrees  radius ratio {r0:.3} least, {r1:.2} at 1 %, {r50:.2} median")?;
+        writeln!(
+            f,
+            "dihedral {least:.1} .. {most:.1} degrees  radius ratio {r0:.3} least, {r1:.2} at 1 %, {r50:.2} median"
+        )?;
         write!(f, "volume {:.2} mL", self.volume * 1e6)?;
         match self.wanted_volume {
             Some(v) => writeln!(f, " ({:+.2} % of {:.2} mL)", (self.volume / v - 1.0) * 100.0, v * 1e6)?,
             None => writeln!(f)?,
         }
-        writeln!(f, "{:<12} {:>9} {:>8} {:>8} {:>8} {:>8}", "surface", "area cm2", "mean mm", "95 % mm", "max mm", "cover %")?;
+        writeln!(
+            f,
+            "{:<12} {:>9} {:>8} {:>8} {:>8} {:>8}",
+            "surface", "area cm2", "mean mm", "95 % mm", "max mm", "cover %"
+        )?;
         for s in &self.surfaces {
             let cover = s.cover.map_or("-".into(), |c| format!("{:.1}", c * 100.0));
             let [mean, p95, max] = [s.mean, s.p95, s.max].map(|d| d * 1e3);

@@ -76,8 +76,20 @@ pub(super) struct Warped<'a> {
 
 /// Steps to the 14 neighbours: six along the axes, then the eight half diagonals. Opposite steps are paired.
 const STEPS: [[i32; 3]; 14] = [
-    [2, 0, 0], [-2, 0, 0], [0, 2, 0], [0, -2, 0], [0, 0, 2], [0, 0, -2],
-    [1, 1, 1], [-1, -1, -1], [1, 1, -1], [-1, -1, 1], [1, -1, 1], [-1, 1, -1], [1, -1, -1], [-1, 1, 1],
+    [2, 0, 0],
+    [-2, 0, 0],
+    [0, 2, 0],
+    [0, -2, 0],
+    [0, 0, 2],
+    [0, 0, -2],
+    [1, 1, 1],
+    [-1, -1, -1],
+    [1, 1, -1],
+    [-1, -1, 1],
+    [1, -1, 1],
+    [-1, 1, -1],
+    [1, -1, -1],
+    [-1, 1, 1],
 ];
 
 fn step(c: [i32; 3], k: usize) -> [i32; 3] {
@@ -170,8 +182,7 @@ impl<'a> Warped<'a> {
             for k in 0..14 {
                 let Some(number) = self.edge[slot][k].checked_sub(1) else { continue };
                 let cut = self.cuts[number as usize];
-                let (length, alpha) =
-                    if k < 6 { (1.0, ALPHA_LONG) } else { (0.75f64.sqrt(), ALPHA_SHORT) };
+                let (length, alpha) = if k < 6 { (1.0, ALPHA_LONG) } else { (0.75f64.sqrt(), ALPHA_SHORT) };
                 let share = (cut.position - home).norm() / (length * self.lattice.edge);
                 if share < alpha && nearest.is_none_or(|n| share < n.0) {
                     nearest = Some((share, cut));

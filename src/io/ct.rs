@@ -114,11 +114,20 @@ pub(super) fn gunzip(path: &Path, packed: &[u8], limit: u64) -> Result<Vec<u8>, 
 /// A grid from the world steps (mm, LPS) of its axes.
 pub(super) fn grid(path: &Path, dims: [usize; 3], axes: [Vec3; 3], origin: Vec3) -> Result<Grid, IoError> {
     if dims.iter().any(|&n| n < 2) {
-        return Err(IoError::unsupported(path, format!("a grid of {dims:?} samples"), "a volume of at least 2 x 2 x 2 is needed"));
+        return Err(IoError::unsupported(
+            path,
+            format!("a grid of {dims:?} samples"),
+            "a volume of at least 2 x 2 x 2 is needed",
+        ));
     }
     let lengths = axes.map(|a| a.norm());
     if !lengths.iter().all(|l| l.is_finite() && *l > 0.0) || !origin.iter().all(|c| c.is_finite()) {
-        return Err(IoError::format(path, "the header", format!("voxel edges of {lengths:?} mm"), "positive, finite edges"));
+        return Err(IoError::format(
+            path,
+            "the header",
+            format!("voxel edges of {lengths:?} mm"),
+            "positive, finite edges",
+        ));
     }
     let unit = [0, 1, 2].map(|a| axes[a] / lengths[a]);
     let shear = unit[0].dot(&unit[1]).abs().max(unit[1].dot(&unit[2]).abs()).max(unit[2].dot(&unit[0]).abs());

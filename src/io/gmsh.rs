@@ -26,7 +26,11 @@ pub(super) fn text(mesh: &TetMesh, path: &Path) -> Result<String, IoError> {
     ];
     let [points, surfaces, volumes] = &groups;
     if let Some(name) = groups.iter().flatten().find(|n| n.contains(['"', '\n', '\r'])) {
-        return Err(IoError::unsupported(path, format!("the name {name:?}"), "Gmsh names hold no quotes or line ends: rename it"));
+        return Err(IoError::unsupported(
+            path,
+            format!("the name {name:?}"),
+            "Gmsh names hold no quotes or line ends: rename it",
+        ));
     }
     let n_nodes = mesh.nodes.len();
     let mut out = String::from("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n");
@@ -230,7 +234,11 @@ fn node_count(kind: u32, path: &Path) -> Result<usize, IoError> {
         TET | 3 => Ok(4),
         _ => {
             let found = format!("elements of Gmsh type {kind}");
-            Err(IoError::unsupported(path, found, "linear tetrahedra are read: mesh with order 1 and without recombination"))
+            Err(IoError::unsupported(
+                path,
+                found,
+                "linear tetrahedra are read: mesh with order 1 and without recombination",
+            ))
         }
     }
 }

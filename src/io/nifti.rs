@@ -41,7 +41,11 @@ pub(super) fn read(path: &Path) -> Result<Volume, IoError> {
         512 => Scalar::U16,
         768 => Scalar::U32,
         other => {
-            return Err(IoError::unsupported(path, format!("NIfTI data type {other}"), "save it as int16 Hounsfield units"));
+            return Err(IoError::unsupported(
+                path,
+                format!("NIfTI data type {other}"),
+                "save it as int16 Hounsfield units",
+            ));
         }
     };
     let (axes, origin) = orientation(path, &header)?;
@@ -69,7 +73,10 @@ fn orientation(path: &Path, header: &NiftiHeader) -> Result<([Vec3; 3], Vec3), I
     };
     let (columns, origin) = if header.sform_code > 0 {
         let rows = [row(header.srow_x), row(header.srow_y), row(header.srow_z)];
-        ([0, 1, 2].map(|a| Vec3::new(rows[0][a], rows[1][a], rows[2][a])), Vec3::new(rows[0][3], rows[1][3], rows[2][3]))
+        (
+            [0, 1, 2].map(|a| Vec3::new(rows[0][a], rows[1][a], rows[2][a])),
+            Vec3::new(rows[0][3], rows[1][3], rows[2][3]),
+        )
     } else if header.qform_code > 0 {
         let [b, c, d] = [header.quatern_b, header.quatern_c, header.quatern_d].map(f64::from);
         let a = (1.0 - b * b - c * c - d * d).max(0.0).sqrt();

@@ -94,7 +94,13 @@ fn scalar(path: &Path, name: &str) -> Result<Scalar, IoError> {
         "uint" | "unsigned int" | "uint32" | "uint32_t" => Scalar::U32,
         "float" => Scalar::F32,
         "double" => Scalar::F64,
-        other => return Err(IoError::unsupported(path, format!("NRRD type `{other}`"), "save it as int16 Hounsfield units")),
+        other => {
+            return Err(IoError::unsupported(
+                path,
+                format!("NRRD type `{other}`"),
+                "save it as int16 Hounsfield units",
+            ));
+        }
     })
 }
 

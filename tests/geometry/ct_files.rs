@@ -7,7 +7,8 @@ use super::mesh_files::scratch;
 
 /// The shared head CT data, if it is here.
 pub fn data(name: &str) -> Option<PathBuf> {
-    let base = std::env::var_os("CUTIS_DATA").map_or(Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let base = std::env::var_os("CUTIS_DATA")
+        .map_or(Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
     let path = base.join(name);
     if !path.exists() {
         println!("SKIPPED: {} is not here; set CUTIS_DATA to the folder of the head CT data", path.display());
@@ -28,7 +29,9 @@ fn nrrd_and_dicom_hold_the_same_volume() {
 
 #[test]
 fn nifti_head_and_labels() {
-    let (Some(head), Some(labels)) = (data("cthead_unc_clean.nii.gz"), data("cthead_unc_labels.nii.gz")) else { return };
+    let (Some(head), Some(labels)) = (data("cthead_unc_clean.nii.gz"), data("cthead_unc_labels.nii.gz")) else {
+        return;
+    };
     let volume = read_volume(&head).unwrap();
     assert_eq!(volume.grid.dims, [256, 256, 113]);
     assert!((volume.grid.origin.x + 0.1275).abs() < 1e-12 && (volume.grid.spacing.z - 0.002).abs() < 1e-12);
@@ -164,7 +167,9 @@ fn nrrd(name: &str, head: &str, data: &[u8]) -> Result<cutis::geometry::Volume, 
 #[test]
 fn nrrd_is_checked() {
     let head = |sizes: &str, directions: &str, encoding: &str| {
-        format!("NRRD0005\n# c\ntype: short\ndimension: 3\nspace: right-anterior-superior\nsizes: {sizes}\nspace directions: {directions}\nendian: little\nencoding: {encoding}\nspace origin: (1,2,3)\n\n")
+        format!(
+            "NRRD0005\n# c\ntype: short\ndimension: 3\nspace: right-anterior-superior\nsizes: {sizes}\nspace directions: {directions}\nendian: little\nencoding: {encoding}\nspace origin: (1,2,3)\n\n"
+        )
     };
     let straight = "(1,0,0) (0,2,0) (0,0,3)";
     let data: Vec<u8> = (0..8i16).flat_map(|v| v.to_le_bytes()).collect();

@@ -27,7 +27,11 @@ fn distance_to_a_ball_is_a_distance() {
         let p = Vec3::from_fn(|_, _| 0.001 + 0.037 * random.next());
         let exact = (p - Vec3::repeat(0.0195)).norm() - 0.012;
         let error = (field.at(&p) - exact).abs();
-        if exact.abs() < 1.5e-3 { near = near.max(error) } else { far = far.max(error) }
+        if exact.abs() < 1.5e-3 {
+            near = near.max(error)
+        } else {
+            far = far.max(error)
+        }
         assert_eq!(field.at(&p) > 0.0, field.level(&p) > 0.0);
     }
     // Trilinear sampling of a bent surface near it, first-order sweeps beyond; the ball's centre is the worst place.
@@ -42,7 +46,8 @@ fn nearest_agrees_with_brute_force() {
     let mut random = Random(5);
     for _ in 0..200 {
         let p = Vec3::from_fn(|_, _| -0.01 + 0.06 * random.next());
-        let each = (0..surface.triangles.len()).map(|t| (cutis::geometry::nearest_on_triangle(&p, surface.corners(t)) - p).norm());
+        let each = (0..surface.triangles.len())
+            .map(|t| (cutis::geometry::nearest_on_triangle(&p, surface.corners(t)) - p).norm());
         let brute = each.fold(f64::INFINITY, f64::min);
         let (found, _) = bins.distance(&p, f64::INFINITY).unwrap();
         assert!((found - brute).abs() < 1e-12, "{found} {brute}");

@@ -131,7 +131,8 @@ fn base64(bytes: &[u8]) -> String {
 
 #[test]
 fn vtu_of_other_writers_is_read() {
-    let points: Vec<u8> = [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let points: Vec<u8> =
+        [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.].iter().flat_map(|x| x.to_le_bytes()).collect();
     let plain = |bytes: &[u8]| base64(&[&(bytes.len() as u32).to_le_bytes(), bytes].concat());
     let zlib = |bytes: &[u8]| {
         let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
@@ -181,7 +182,13 @@ fn results_carry_their_fields() {
 
 #[test]
 fn baked_model_of_50k_tets_reads_fast() {
-    let spec = Block { origin: Vec3::zeros(), size: Vec3::repeat(0.1), cells: [20, 20, 21], pattern: Pattern::Six, layers: vec![] };
+    let spec = Block {
+        origin: Vec3::zeros(),
+        size: Vec3::repeat(0.1),
+        cells: [20, 20, 21],
+        pattern: Pattern::Six,
+        layers: vec![],
+    };
     let mesh = block(&spec).unwrap();
     assert!(mesh.tets.len() > 50_000);
     let bytes = encode(&mesh);

@@ -78,7 +78,10 @@ fn random_balls_stay_in_bounds() {
         let stuffing = tetrahedralise(&walls, &region, &Uniform(3e-3)).unwrap();
         let report = MeshReport::of(&mesh_of(&stuffing, &walls), 0);
         assert!(report.is_sound(), "trial {trial} of seed 11\n{report}");
-        assert!(report.dihedral[0] >= DIHEDRAL[0] && report.dihedral[1] <= DIHEDRAL[1], "trial {trial} of seed 11\n{report}");
+        assert!(
+            report.dihedral[0] >= DIHEDRAL[0] && report.dihedral[1] <= DIHEDRAL[1],
+            "trial {trial} of seed 11\n{report}"
+        );
     }
 }
 

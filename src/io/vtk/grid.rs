@@ -90,7 +90,12 @@ impl Grid {
         for (cell, (&kind, &end)) in self.types.iter().zip(&self.offsets).enumerate() {
             let corners = usize::try_from(end).ok().and_then(|end| self.connectivity.get(begin..end));
             let corners = corners.ok_or_else(|| {
-                IoError::format(path, format!("cell {cell}"), format!("offset {end}"), "offsets that grow and stay in range")
+                IoError::format(
+                    path,
+                    format!("cell {cell}"),
+                    format!("offset {end}"),
+                    "offsets that grow and stay in range",
+                )
             })?;
             begin = end as usize;
             match (kind, corners) {
@@ -107,7 +112,11 @@ impl Grid {
                 (0..=9, _) => {}
                 _ => {
                     let found = format!("cell {cell} of VTK type {kind} with {} corners", corners.len());
-                    return Err(IoError::unsupported(path, found, "only linear tetrahedra (type 10) are read: tetrahedralise first"));
+                    return Err(IoError::unsupported(
+                        path,
+                        found,
+                        "only linear tetrahedra (type 10) are read: tetrahedralise first",
+                    ));
                 }
             }
         }
@@ -115,7 +124,8 @@ impl Grid {
         for array in &self.point_data {
             let Some(name) = array.name.strip_prefix(NODE_SET) else { continue };
             let inside = array.integers().filter(|v| v.len() == mesh.nodes.len());
-            let inside = inside.ok_or_else(|| IoError::format(path, &array.name, "another length or text", "0 or 1 a node"))?;
+            let inside =
+                inside.ok_or_else(|| IoError::format(path, &array.name, "another length or text", "0 or 1 a node"))?;
             let nodes = (0u32..).zip(&inside).filter(|(_, v)| **v != 0).map(|(a, _)| a).collect();
             mesh.node_sets.push(NodeSet { name: name.into(), nodes });
         }
@@ -123,7 +133,8 @@ impl Grid {
             let Some(name) = array.name.strip_prefix(FACE_SET) else { continue };
             let corners = array.integers().filter(|v| v.len() % 3 == 0).unwrap_or_default();
             let corners: Option<Vec<u32>> = corners.iter().map(|&a| u32::try_from(a).ok()).collect();
-            let corners = corners.ok_or_else(|| IoError::format(path, &array.name, "negative numbers", "node numbers"))?;
+            let corners =
+                corners.ok_or_else(|| IoError::format(path, &array.name, "negative numbers", "node numbers"))?;
             let triangles = corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
             mesh.face_sets.push(FaceSet { name: name.into(), triangles });
         }

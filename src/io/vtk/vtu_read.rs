@@ -172,7 +172,11 @@ impl VtuFile<'_> {
             "" => false,
             "vtkZLibDataCompressor" => true,
             other => {
-                return Err(IoError::unsupported(self.path, format!("data compressed by {other}"), "save it with zlib or none"));
+                return Err(IoError::unsupported(
+                    self.path,
+                    format!("data compressed by {other}"),
+                    "save it with zlib or none",
+                ));
             }
         };
         Ok(())
@@ -188,16 +192,20 @@ impl VtuFile<'_> {
             ("ascii" | "", Some(text)) => {
                 let words = text.split_ascii_whitespace();
                 if kind.starts_with("Float") {
-                    let v: Result<_, _> = words.map(|w| w.parse().map_err(|_| slip(format!("`{w}`"), "a number"))).collect();
+                    let v: Result<_, _> =
+                        words.map(|w| w.parse().map_err(|_| slip(format!("`{w}`"), "a number"))).collect();
                     Values::F64(v?)
                 } else {
-                    let v: Result<_, _> = words.map(|w| w.parse().map_err(|_| slip(format!("`{w}`"), "an integer"))).collect();
+                    let v: Result<_, _> =
+                        words.map(|w| w.parse().map_err(|_| slip(format!("`{w}`"), "an integer"))).collect();
                     Values::I64(v?)
                 }
             }
             ("binary", Some(text)) => self.values(kind, &self.bytes(name, &Source::Base64(text.as_bytes()))?, name)?,
             ("appended", _) => {
-                let offset: usize = get("offset").parse().map_err(|_| slip(format!("offset `{}`", get("offset")), "a count of bytes"))?;
+                let offset: usize = get("offset")
+                    .parse()
+                    .map_err(|_| slip(format!("offset `{}`", get("offset")), "a count of bytes"))?;
                 let data = self.appended.get(offset..).ok_or_else(|| {
                     IoError::truncated(self.path, format!("array `{name}`"), offset as u64, self.appended.len() as u64)
                 })?;
@@ -269,7 +277,12 @@ impl VtuFile<'_> {
             "Int64" | "UInt64" => ints(8, true),
             other => {
                 let place = format!("array `{name}`");
-                return Err(IoError::format(self.path, place, format!("type `{other}`"), "Float32/64, (U)Int8..64 or String"));
+                return Err(IoError::format(
+                    self.path,
+                    place,
+                    format!("type `{other}`"),
+                    "Float32/64, (U)Int8..64 or String",
+                ));
             }
         })
     }

@@ -60,9 +60,14 @@ impl Appender {
         let (kind, bytes): (&str, Vec<u8>) = match &array.values {
             Values::F64(v) => ("Float64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
             Values::I64(v) => ("Int64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
-            Values::I8(v) => (if array.name == "types" { "UInt8" } else { "Int8" }, v.iter().map(|&x| x as u8).collect()),
+            Values::I8(v) => {
+                (if array.name == "types" { "UInt8" } else { "Int8" }, v.iter().map(|&x| x as u8).collect())
+            }
             Values::Text(words) => {
-                self.head += &format!("<Array type=\"String\" Name=\"{name}\" NumberOfTuples=\"{}\" format=\"ascii\">\n", words.len());
+                self.head += &format!(
+                    "<Array type=\"String\" Name=\"{name}\" NumberOfTuples=\"{}\" format=\"ascii\">\n",
+                    words.len()
+                );
                 let codes = words.iter().flat_map(|w| w.bytes().chain([0]));
                 self.head += &codes.map(|c| c.to_string()).collect::<Vec<_>>().join(" ");
                 self.head += "\n</Array>\n";
@@ -77,7 +82,9 @@ impl Appender {
         let components = array.components;
         let rows = if tuples { format!(" NumberOfTuples=\"{}\"", count / components.max(1)) } else { String::new() };
         let offset = self.appended.len();
-        self.head += &format!("<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"{rows} format=\"appended\" offset=\"{offset}\"/>\n");
+        self.head += &format!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"{rows} format=\"appended\" offset=\"{offset}\"/>\n"
+        );
         self.appended.extend((bytes.len() as u64).to_le_bytes());
         self.appended.extend(bytes);
     }
