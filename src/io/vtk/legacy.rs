@@ -39,7 +39,10 @@ fn put_field(out: &mut String, arrays: &[Array]) {
     for array in arrays {
         let (kind, words): (&str, Vec<String>) = match &array.values {
             Values::F64(v) => ("double", v.iter().map(|&x| exact(x)).collect()),
-            Values::I64(v) => ("vtktypeint64", v.iter().map(i64::to_string).collect()),
+            Values::I64(v) => (
+                if v.iter().all(|&x| i32::try_from(x).is_ok()) { "int" } else { "vtktypeint64" },
+                v.iter().map(i64::to_string).collect(),
+            ),
             Values::I8(v) => ("char", v.iter().map(i8::to_string).collect()),
             // Character codes, as in .vtu: readers that know numbers only pass over them.
             Values::Text(v) => {
