@@ -91,7 +91,8 @@ impl Baked {
 fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, Error> {
     let file = parse(text, path)?;
     let mesh = mesh_of(text, &file, path, folder)?;
-    let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n"));
+    let order = file.order().map_or(String::new(), |order| format!("order = {order}\n"));
+    let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n{order}"));
     Ok(Baked { scene: replaced, mesh: io::encode(&mesh) })
 }
 

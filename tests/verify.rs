@@ -11,6 +11,8 @@ mod golden;
 mod invariants;
 #[path = "verify/loads.rs"]
 mod loads;
+#[path = "verify/locking.rs"]
+mod locking;
 #[path = "verify/patch.rs"]
 mod patch;
 #[path = "verify/rigid.rs"]

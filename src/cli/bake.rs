@@ -70,7 +70,10 @@ impl Bake {
         for layer in &baked.layers {
             println!("layer {:<11} {:.1} % of the volume", layer.name, 100.0 * layer.reached);
         }
-        println!("slit: {} nodes doubled; {} bone nodes released between two bones", baked.slit_nodes, baked.released_nodes);
+        println!(
+            "slit: {} nodes doubled; {} bone nodes released between two bones",
+            baked.slit_nodes, baked.released_nodes
+        );
         io::write_mesh(&self.out, &baked.mesh)?;
         println!("wrote {}", self.out.display());
         Ok(())

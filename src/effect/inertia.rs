@@ -11,14 +11,21 @@ use crate::fem::{At, Curvature, HessianSink, Term};
 use crate::math::{Mat3, Vec3};
 use crate::mesh::TetMesh;
 
-/// A quarter of each tetrahedron's mass to each corner, kg; `density` by region, kg/m3.
-pub fn lumped_masses(mesh: &TetMesh, density: &[f64]) -> Vec<f64> {
+/// Share of a quadratic tetrahedron's mass at a corner and at a mid-edge node.
+///
+/// Source: Hinton, Rock & Zienkiewicz, "A note on mass lumping", Earthquake Eng. Struct. Dyn. 4(3), 1976.
+const CORNER: f64 = 1.0 / 36.0;
+const MIDSIDE: f64 = 4.0 / 27.0;
+
+/// Mass of each node, kg: a quarter of a linear tetrahedron's to each corner, in proportion to the diagonal of the
+/// consistent mass matrix for a quadratic one; `density` by region, kg/m3.
+pub fn lumped_masses(mesh: &TetMesh, midsides: &[[u32; 6]], density: &[f64]) -> Vec<f64> {
     let mut m = vec![0.0; mesh.nodes.len()];
     for (e, tet) in mesh.tets.iter().enumerate() {
-        let quarter = 0.25 * density[mesh.region[e] as usize] * mesh.volume(e);
-        for &a in tet {
-            m[a as usize] += quarter;
-        }
+        let mass = density[mesh.region[e] as usize] * mesh.volume(e);
+        let corner = if midsides.is_empty() { 0.25 } else { CORNER };
+        tet.iter().for_each(|&a| m[a as usize] += corner * mass);
+        midsides.get(e).into_iter().flatten().for_each(|&a| m[a as usize] += MIDSIDE * mass);
     }
     m
 }

@@ -12,7 +12,7 @@ pub use gravity::Gravity;
 pub use inertia::{Inertia, lumped_masses};
 pub use load::DeadLoad;
 pub use pressure::Pressure;
-pub use tissue::{ENERGIES, Elastic, elastic_tissue};
+pub use tissue::{Elements, LAWS, Law, law};
 
 use crate::math::Vec3;
 

@@ -1,37 +1,104 @@
-//! Elastic tissue: linear tetrahedra of one region and one energy.
+//! Elastic tissue: tetrahedra of one material; the catalogue of laws.
 
-use crate::energy::{Corotational, Energy, Lame, Linear, NeoHookean, StVenantKirchhoff, StableNeoHookean};
-use crate::fem::{OnElements, Term, Tet4};
+use crate::energy::{
+    Corotational, Energy, Fung, Isochoric, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, Principal, StVenantKirchhoff,
+    StableNeoHookean, Stretches, VerondaWestmann, WithBulk, Yeoh,
+};
+use crate::fem::{OnElements, Term, Tet4, Tet10};
 use crate::math::Vec3;
 
-/// An elastic law by name with its small-strain constants.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Elastic<'a> {
-    /// One of [`ENERGIES`].
-    pub energy: &'a str,
-    /// Young's modulus at small strain, Pa.
-    pub E: f64,
-    /// Poisson's ratio at small strain.
-    pub nu: f64,
+/// The elements of a tissue.
+#[derive(Clone, Copy)]
+pub struct Elements<'a> {
+    /// Rest positions of all nodes, m.
+    pub X: &'a [Vec3],
+    /// Corners of each tetrahedron.
+    pub tets: &'a [[u32; 4]],
+    /// Mid-edge nodes of each tetrahedron; empty for linear elements.
+    pub midsides: &'a [[u32; 6]],
 }
 
-type Build = fn(Lame, &[Vec3], &mut dyn Iterator<Item = [u32; 4]>) -> Box<dyn Term>;
+/// An elastic law that a scene can choose.
+pub struct Law {
+    /// Name.
+    pub name: &'static str,
+    /// Keys of its constants, in the order in which `moduli` and `term` take them.
+    pub keys: &'static [&'static str],
+    /// Lame's constants at small strain, Pa.
+    pub moduli: fn(&[Vec<f64>]) -> Lame,
+    /// The tissue as a term.
+    pub term: fn(&[Vec<f64>], Elements) -> Box<dyn Term>,
+}
 
-/// The elastic laws a scene can choose, by name: the catalogue's one list.
-pub const ENERGIES: [(&str, Build); 5] = [
-    (Linear::NAME, |l, X, tets| term(Linear(l), X, tets)),
-    (Corotational::NAME, |l, X, tets| term(Corotational(l), X, tets)),
-    (StVenantKirchhoff::NAME, |l, X, tets| term(StVenantKirchhoff(l), X, tets)),
-    (StableNeoHookean::NAME, |l, X, tets| term(StableNeoHookean(l), X, tets)),
-    (NeoHookean::NAME, |l, X, tets| term(NeoHookean(l), X, tets)),
+fn term<M: Energy + 'static>(material: M, elements: Elements) -> Box<dyn Term> {
+    let Elements { X, tets, midsides } = elements;
+    if midsides.is_empty() {
+        return Box::new(OnElements(Tet4::new(material, X, tets.iter().copied())));
+    }
+    let ten = |(t, m): (&[u32; 4], &[u32; 6])| std::array::from_fn(|k| if k < 4 { t[k] } else { m[k - 4] });
+    Box::new(OnElements(Tet10::new(material, X, tets.iter().zip(midsides).map(ten))))
+}
+
+fn lame(c: &[Vec<f64>]) -> Lame {
+    Lame::new(c[0][0], c[1][0])
+}
+
+/// Lame's constants of a shear modulus and the bulk modulus, which is the last constant.
+fn with_bulk(mu: f64, c: &[Vec<f64>]) -> Lame {
+    let kappa = c[c.len() - 1][0];
+    Lame { mu, lambda: kappa - 2.0 / 3.0 * mu }
+}
+
+fn bulk<L: Isochoric + 'static>(law: L, c: &[Vec<f64>], tets: Elements) -> Box<dyn Term> {
+    term(WithBulk { law, kappa: c[c.len() - 1][0] }, tets)
+}
+
+fn ogden(c: &[Vec<f64>]) -> Ogden {
+    Ogden { terms: c[0].iter().copied().zip(c[1].iter().copied()).collect(), kappa: c[2][0] }
+}
+
+const E_NU: &[&str] = &["E", "nu"];
+
+/// The elastic laws by name: the one list.
+pub const LAWS: &[Law] = &[
+    Law { name: Linear::NAME, keys: E_NU, moduli: lame, term: |c, t| term(Linear(lame(c)), t) },
+    Law { name: Corotational::NAME, keys: E_NU, moduli: lame, term: |c, t| term(Corotational(lame(c)), t) },
+    Law { name: StVenantKirchhoff::NAME, keys: E_NU, moduli: lame, term: |c, t| term(StVenantKirchhoff(lame(c)), t) },
+    Law { name: StableNeoHookean::NAME, keys: E_NU, moduli: lame, term: |c, t| term(StableNeoHookean(lame(c)), t) },
+    Law { name: NeoHookean::NAME, keys: E_NU, moduli: lame, term: |c, t| term(NeoHookean(lame(c)), t) },
+    Law {
+        name: MooneyRivlin::NAME,
+        keys: &["c10", "c01", "kappa"],
+        moduli: |c| with_bulk(2.0 * (c[0][0] + c[1][0]), c),
+        term: |c, t| bulk(MooneyRivlin { c10: c[0][0], c01: c[1][0] }, c, t),
+    },
+    Law {
+        name: Yeoh::NAME,
+        keys: &["c10", "c20", "c30", "kappa"],
+        moduli: |c| with_bulk(2.0 * c[0][0], c),
+        term: |c, t| bulk(Yeoh { c10: c[0][0], c20: c[1][0], c30: c[2][0] }, c, t),
+    },
+    Law {
+        name: Fung::NAME,
+        keys: &["mu", "b", "kappa"],
+        moduli: |c| with_bulk(c[0][0], c),
+        term: |c, t| bulk(Fung { mu: c[0][0], b: c[1][0] }, c, t),
+    },
+    Law {
+        name: VerondaWestmann::NAME,
+        keys: &["c1", "c2", "kappa"],
+        moduli: |c| with_bulk(c[0][0] * c[1][0], c),
+        term: |c, t| bulk(VerondaWestmann { c1: c[0][0], c2: c[1][0] }, c, t),
+    },
+    Law {
+        name: <Ogden as Principal>::NAME,
+        keys: &["mu", "alpha", "kappa"],
+        moduli: |c| with_bulk(c[0].iter().sum(), c),
+        term: |c, t| term(Stretches(ogden(c)), t),
+    },
 ];
 
-fn term<M: Energy + 'static>(material: M, X: &[Vec3], tets: &mut dyn Iterator<Item = [u32; 4]>) -> Box<dyn Term> {
-    Box::new(OnElements(Tet4::new(material, X, tets)))
-}
-
-/// The given tetrahedra of rest positions `X` as a term; `None` if no energy has this name.
-pub fn elastic_tissue(law: &Elastic, X: &[Vec3], mut tets: impl Iterator<Item = [u32; 4]>) -> Option<Box<dyn Term>> {
-    let (_, build) = ENERGIES.iter().find(|(name, _)| *name == law.energy)?;
-    Some(build(Lame::new(law.E, law.nu), X, &mut tets))
+/// The law of this name.
+pub fn law(name: &str) -> Option<&'static Law> {
+    LAWS.iter().find(|l| l.name == name)
 }

@@ -3,16 +3,30 @@
 #![allow(non_snake_case)]
 
 mod corotational;
+mod fung;
+mod isochoric;
 mod linear;
+mod mooney_rivlin;
 mod neo_hookean;
+mod ogden;
+mod principal;
 mod st_venant_kirchhoff;
 mod stable_neo_hookean;
+mod veronda_westmann;
+mod yeoh;
 
 pub use corotational::Corotational;
+pub use fung::Fung;
+pub use isochoric::{Isochoric, Slopes, WithBulk};
 pub use linear::Linear;
+pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
+pub use ogden::Ogden;
+pub use principal::{Principal, Stretches};
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use stable_neo_hookean::StableNeoHookean;
+pub use veronda_westmann::VerondaWestmann;
+pub use yeoh::Yeoh;
 
 use crate::math::{Mat3, Mat9};
 

@@ -5,11 +5,15 @@
 mod assemble;
 mod dofs;
 mod matrix;
+mod quadratic;
 mod term;
+mod tet10;
 mod tet4;
 
 pub use assemble::Assembly;
 pub use dofs::{Configuration, Dofs, RigidBody, Role};
 pub use matrix::{BlockMatrix, CouplingMatrix, Pattern};
+pub use quadratic::{EDGES, add_midsides};
 pub use term::{At, Curvature, HessianSink, Kernel, OnElements, Strain, Term};
+pub use tet10::Tet10;
 pub use tet4::{Tet4, shape_gradients};

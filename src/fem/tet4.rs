@@ -9,7 +9,7 @@
 
 use super::{Curvature, Kernel, Strain};
 use crate::energy::Energy;
-use crate::math::{Mat3, Vec3, clamp_eigenvalues};
+use crate::math::{Mat3, Mat9, Vec3, clamp_eigenvalues};
 
 /// Gradients of the four shape functions (1/m) and the volume (m3) of a tetrahedron.
 pub fn shape_gradients(X: &[Vec3; 4]) -> ([Vec3; 4], f64) {
@@ -81,12 +81,7 @@ impl<M: Energy> Kernel<4> for Tet4<M> {
         if curvature == Curvature::Projected {
             H = clamp_eigenvalues(&H);
         }
-        // half[b] = V dP/dF . dN_b as three 3x3 slabs, one a column j of P.
-        let slab = |j: usize, l: usize| H.fixed_view::<3, 3>(3 * j, 3 * l);
-        let half = [1, 2, 3].map(|b| {
-            let w = *V * dN[b];
-            [0, 1, 2].map(|j| slab(j, 0) * w[0] + slab(j, 1) * w[1] + slab(j, 2) * w[2])
-        });
+        let half = [1, 2, 3].map(|b| contract(&H, &(*V * dN[b])));
         let block = |a: usize, b: usize| {
             let [h0, h1, h2] = &half[b - 1];
             h0 * dN[a][0] + h1 * dN[a][1] + h2 * dN[a][2]
@@ -114,10 +109,16 @@ impl<M: Energy> Kernel<4> for Tet4<M> {
     }
 }
 
+/// dP/dF . w as three 3x3 slabs, one for each column j of P.
+pub(super) fn contract(H: &Mat9, w: &Vec3) -> [Mat3; 3] {
+    let slab = |j: usize, l: usize| H.fixed_view::<3, 3>(3 * j, 3 * l);
+    [0, 1, 2].map(|j| slab(j, 0) * w[0] + slab(j, 1) * w[1] + slab(j, 2) * w[2])
+}
+
 /// Largest eigenvalue of a symmetric matrix, in closed form.
 ///
 /// Source: Smith, "Eigenvalues of a symmetric 3 x 3 matrix", Comm. ACM 4(4), 1961.
-fn largest_eigenvalue(A: &Mat3) -> f64 {
+pub(super) fn largest_eigenvalue(A: &Mat3) -> f64 {
     let q = A.trace() / 3.0;
     let B = A - q * Mat3::identity();
     let p = (B.norm_squared() / 6.0).sqrt();

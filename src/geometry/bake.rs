@@ -3,7 +3,8 @@
 use std::fmt;
 
 use super::assemble::{Assembled, Bone, Kind, Naming, assemble};
-use super::clean::{crop, one_body, outer_air, solid_bones};
+use super::distance::{travel, unsigned};
+use super::clean::{crop, flood, one_body, outer_air, solid_bones};
 use super::label::{LayerShare, Layers};
 use super::separate::{BONES, bone_map};
 use super::stuffing::{Side, Wall};
@@ -21,6 +22,8 @@ const MARGIN: f64 = 0.010;
 const RIM: f64 = 0.005;
 /// Tissue thinner than this many lattice edges is warned of.
 const THIN: f64 = 2.0;
+/// Thickened tissue is this many edges thick: a lattice breaks through thinner layers.
+const THICK: f64 = 1.7;
 /// Thin places are gathered over cells of this size, m; the worst ones are told.
 const THIN_CELL: f64 = 0.02;
 const THIN_TOLD: usize = 12;
@@ -28,6 +31,8 @@ const THIN_TOLD: usize = 12;
 const FAT_HU: f64 = -10.0;
 /// Half width and half height of the mouth, and how far behind the front of the teeth the slit may reach, m.
 const MOUTH: [f64; 3] = [0.025, 0.018, 0.010];
+/// Ways into the depth pass bone at this distance at least, m: not through the thin roof of an orbit into the brain.
+const PASSAGE: f64 = 3e-3;
 /// Search reach for the nearest bone, m.
 const REACH: f64 = 0.06;
 
@@ -42,6 +47,10 @@ pub struct BakeOptions {
     pub roi: Option<[Vec3; 2]>,
     /// Lattice edge, m.
     pub edge: f64,
+    /// How far from the outer skin the mesh reaches, m, measured round the bones: without the brain behind them.
+    pub depth: f64,
+    /// Whether tissue too thin for the lattice is thickened into the bone under it, so that the skin stays whole.
+    pub thicken: bool,
     /// Tissue layers by depth.
     pub layers: Layers,
     /// Whether Hounsfield units tell fat from muscle below the dermis.
@@ -59,6 +68,8 @@ impl Default for BakeOptions {
             bone_hu: 250.0,
             roi: None,
             edge: 4e-3,
+            depth: 0.05,
+            thicken: true,
             layers: Layers::default(),
             fat_by_hu: true,
             slit: true,
@@ -70,7 +81,7 @@ impl Default for BakeOptions {
 /// Something the user should know about a mesh that was made.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
-    /// Tissue thinner than the lattice resolves.
+    /// Tissue thinner than the lattice resolves: missing, or thickened into the bone.
     Thin {
         /// Thinnest place, LPS, m.
         place: Vec3,
@@ -78,6 +89,8 @@ pub enum Warning {
         thickness: f64,
         /// Skin area about it that is thinner than twice the edge, m2.
         area: f64,
+        /// Whether the mesh was thickened there.
+        thickened: bool,
     },
     /// More thin places than were told one by one.
     MoreThin {
@@ -104,10 +117,11 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Thin { place, thickness, area } => {
+            Self::Thin { place, thickness, area, thickened } => {
                 let p = place * 1e3;
                 let (t, a) = (thickness * 1e3, area * 1e4);
-                write!(f, "thin tissue: {t:.1} mm at ({:.1}, {:.1}, {:.1}) mm LPS, {a:.1} cm2 about it; it may be missing: choose a shorter edge", p.x, p.y, p.z)
+                let fate = if *thickened { "the mesh is thicker there than the tissue" } else { "it may be missing" };
+                write!(f, "thin tissue: {t:.1} mm at ({:.1}, {:.1}, {:.1}) mm LPS, {a:.1} cm2 about it; {fate}: choose a shorter edge", p.x, p.y, p.z)
             }
             Self::MoreThin { places, area } => write!(f, "thin tissue at {places} more places, {:.1} cm2", area * 1e4),
             Self::JawNotFound => write!(f, "skull and mandible could not be told apart: all bone is `skull`; give a labels file"),
@@ -157,25 +171,36 @@ pub fn bake(
     if first.surface.triangles.is_empty() {
         return Err(empty("bone", options.bone_hu, &part));
     }
-    solid_bones(&mut part, options.skin_hu, options.bone_hu, &first);
+    solid_bones(&mut part, options.bone_hu, &first);
     let to_bone = Distance::to_isosurface(&part, options.bone_hu);
     let to_skin = Distance::to_isosurface(&part, options.skin_hu);
     if to_skin.surface.triangles.is_empty() {
         return Err(empty("skin", options.skin_hu, &part));
     }
     let outer = outer_air(&part, options.skin_hu, &to_skin);
+    let outer_skin = outer_part(&to_skin.surface, &part, &outer);
+    let under = if options.thicken { unsigned(&part.grid, &outer_skin) } else { Vec::new() };
+    let deep = deep(&part, options, &outer, &to_bone);
     progress("bones", 0.45);
     let (map, told) = bone_map(&part, options.bone_hu, labels, &nose);
     let bone_surfaces = split_bones(&part, &to_bone.surface, &map);
     let bins: Vec<Nearest> = bone_surfaces.iter().map(|s| Nearest::new(s, 4e-3)).collect();
-    let to: Vec<_> = bins.iter().map(|b| move |p: &Vec3| b.distance(p, REACH).map_or(REACH, |d| d.0)).collect();
+    let within = |reach: f64| bins.iter().map(move |b| move |p: &Vec3| b.distance(p, reach).map_or(reach, |d| d.0));
+    let to: Vec<_> = within(REACH).collect();
+    // Names only ask whether a second bone is nearer than an edge.
+    let near: Vec<_> = within(2.0 * options.edge).collect();
     progress("tetrahedra", 0.55);
     let skin = Isosurface { volume: &part, iso: options.skin_hu, distance: &to_skin };
     let bone = Isosurface { volume: &part, iso: options.bone_hu, distance: &to_bone };
+    let receded = |p: &Vec3| {
+        let d = bone.at(p);
+        if options.thicken { d.max(THICK * options.edge - part.grid.sample(&under, p)) } else { d }
+    };
     let walls = [
         Wall { name: SKIN, field: &skin, side: Side::Inside },
-        Wall { name: "bone", field: &bone, side: Side::Outside },
+        Wall { name: "bone", field: &receded, side: Side::Outside },
         Wall { name: "cut", field: &region, side: Side::Inside },
+        Wall { name: "deep", field: &deep, side: Side::Inside },
     ];
     let lattice = Lattice::over(&region, &super::Uniform(options.edge) as &dyn Sizing)?;
     let stuffing = stuff(&walls, &lattice)?;
@@ -187,10 +212,10 @@ pub fn bake(
         mouth.is_some_and(|m| m.at(&((c[0] + c[1] + c[2]) / 3.0)) < 0.0) && side(&a) != side(&b)
     };
     let present: Vec<usize> = (0..BONES.len()).filter(|&k| !bone_surfaces[k].triangles.is_empty()).collect();
-    let bones: Vec<Bone> = present.iter().map(|&k| Bone { name: BONES[k], field: &to[k] }).collect();
+    let bones: Vec<Bone> = present.iter().map(|&k| Bone { name: BONES[k], field: &near[k] }).collect();
     let naming = Naming {
         walls: &walls,
-        kinds: &[Kind::Skin, Kind::Bone, Kind::Cut],
+        kinds: &[Kind::Skin, Kind::Bone, Kind::Cut, Kind::Cut],
         bones: &bones,
         edge: options.edge,
         slit: mouth.is_some().then_some(&parts),
@@ -203,14 +228,14 @@ pub fn bake(
     let mesh = mesh.checked()?;
     progress("report", 0.8);
     let mut report = MeshReport::of(&mesh, slit_nodes);
-    report.wanted_volume = Some(tissue_volume(&part, options, &region));
+    let reached = reached(&part, options, &outer, &region, &deep);
+    report.wanted_volume = Some(volume_of(&part, &reached, &region));
     let inner = Cuboid { low: region.low + Vec3::repeat(RIM), high: region.high - Vec3::repeat(RIM) };
-    let outer_skin = outer_part(&to_skin.surface, &part, &outer);
     report.measure_surface(&mesh, SKIN, &outer_skin, &inner);
     for &k in present.iter().filter(|&&k| mesh.face_set(BONES[k]).is_some()) {
-        report.measure_surface(&mesh, BONES[k], &bone_surfaces[k], &inner);
+        report.measure_surface(&mesh, BONES[k], &beside(&bone_surfaces[k], &part, &reached), &inner);
     }
-    let mut warnings = thin(&outer_skin, &to_bone, options.edge, &inner);
+    let mut warnings = thin(&outer_skin, &to_bone, options.edge, &inner, options.thicken);
     if !told {
         warnings.push(Warning::JawNotFound);
     }
@@ -268,6 +293,20 @@ fn part_of(volume: &Volume, region: &Cuboid) -> Volume {
     });
     let bound = |c: f64, a: usize| c.clamp(0.0, grid.dims[a] as f64 - 1.0) as usize;
     crop(volume, [0, 1, 2].map(|a| bound(low[a].floor(), a)), [0, 1, 2].map(|a| bound(high[a].ceil(), a)))
+}
+
+/// Where the mesh ends inside: the way from the outer skin round the bones, less how far it may be.
+fn deep(part: &Volume, options: &BakeOptions, outer: &[bool], to_bone: &Distance) -> impl Field + use<> {
+    let tissue = |hu: &f32| f64::from(*hu) >= options.skin_hu;
+    let sources: Vec<bool> = outer.iter().zip(&part.samples).map(|(&o, hu)| o && !tissue(hu)).collect();
+    let blocked: Vec<bool> = to_bone.values.iter().map(|&d| f64::from(d) < PASSAGE).collect();
+    // A volume without air in front of it has no skin to start from: then nothing is too deep.
+    let found = sources.contains(&true);
+    let way = if found { travel(&part.grid, &sources, &blocked) } else { vec![0.0; part.grid.len()] };
+    let most = options.depth as f32;
+    let values: Vec<f32> = way.into_iter().map(|w| (w - most).clamp(-most, most)).collect();
+    let grid = part.grid.clone();
+    move |p: &Vec3| grid.sample(&values, p)
 }
 
 /// The triangles of each bone, by the bone of the nearest bone sample.
@@ -336,18 +375,47 @@ fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, told: bool) -
     Some(Cuboid { low, high: Vec3::new(nose.x + MOUTH[0], back, z + MOUTH[1]) })
 }
 
-/// Volume of the samples between the thresholds inside the region, m3.
-fn tissue_volume(part: &Volume, options: &BakeOptions, region: &Cuboid) -> f64 {
+/// Samples of tissue that hang together with the outer skin, inside the region and not too deep.
+fn reached(part: &Volume, options: &BakeOptions, outer: &[bool], region: &Cuboid, deep: &dyn Field) -> Vec<bool> {
     let grid = &part.grid;
     let [nx, ny, _] = grid.dims;
-    let tissue = |at: &usize| (options.skin_hu..options.bone_hu).contains(&f64::from(part.samples[*at]));
     let place = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
-    let inside = (0..grid.len()).filter(tissue).filter(|&at| region.at(&place(at)) <= 0.0).count();
-    inside as f64 * grid.spacing.product()
+    let tissue = |at: usize| (options.skin_hu..options.bone_hu).contains(&f64::from(part.samples[at]));
+    let inside = |at: usize| {
+        let p = place(at);
+        tissue(at) && region.at(&p) <= 0.0 && deep.at(&p) <= 0.0
+    };
+    let seeds = (0..grid.len()).filter(|&at| outer[at]);
+    let reached = flood(grid, seeds, inside);
+    if reached.contains(&true) { reached } else { (0..grid.len()).map(inside).collect() }
+}
+
+/// Volume of samples inside a region, m3; those at its rim count with what lies inside.
+fn volume_of(part: &Volume, reached: &[bool], region: &Cuboid) -> f64 {
+    let grid = &part.grid;
+    let [nx, ny, _] = grid.dims;
+    // Half the extent of a voxel along the world axes.
+    let half = grid.direction.map(f64::abs) * grid.spacing / 2.0;
+    let share = |at: usize| {
+        let p = grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
+        let overlap = (p + half).inf(&region.high) - (p - half).sup(&region.low);
+        overlap.sup(&Vec3::zeros()).component_div(&(2.0 * half)).product()
+    };
+    (0..reached.len()).filter(|&at| reached[at]).map(share).sum::<f64>() * grid.spacing.product()
+}
+
+/// The part of a surface with tissue of the region beside it.
+fn beside(surface: &Surface, part: &Volume, reached: &[bool]) -> Surface {
+    let grid = &part.grid;
+    let near = |t: &&[u32; 3]| {
+        let ([i, j, k], _) = grid.cell(&surface.vertices[t[0] as usize]);
+        (0..8).any(|c| reached[grid.index([i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1)])])
+    };
+    compacted(surface, surface.triangles.iter().filter(near).copied().collect())
 }
 
 /// Places where the way from skin to bone is shorter than the lattice resolves, worst first.
-fn thin(skin: &Surface, to_bone: &Distance, edge: f64, within: &Cuboid) -> Vec<Warning> {
+fn thin(skin: &Surface, to_bone: &Distance, edge: f64, within: &Cuboid, thickened: bool) -> Vec<Warning> {
     let mut cells: std::collections::BTreeMap<[i64; 3], (f64, Vec3, f64)> = std::collections::BTreeMap::new();
     for t in 0..skin.triangles.len() {
         let corners = skin.corners(t);
@@ -366,7 +434,7 @@ fn thin(skin: &Surface, to_bone: &Distance, edge: f64, within: &Cuboid) -> Vec<W
     let mut places: Vec<(f64, Vec3, f64)> = cells.into_values().collect();
     places.sort_by(|p, q| p.0.total_cmp(&q.0));
     let rest = places.split_off(places.len().min(THIN_TOLD));
-    let tell = |(thickness, place, area): (f64, Vec3, f64)| Warning::Thin { place, thickness: thickness.max(0.0), area };
+    let tell = |(thickness, place, area): (f64, Vec3, f64)| Warning::Thin { place, thickness: thickness.max(0.0), area, thickened };
     let mut warnings: Vec<Warning> = places.into_iter().map(tell).collect();
     if !rest.is_empty() {
         warnings.push(Warning::MoreThin { places: rest.len(), area: rest.iter().map(|p| p.2).sum() });

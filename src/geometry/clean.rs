@@ -5,8 +5,9 @@ use crate::math::Vec3;
 
 /// Air, HU: what lies outside the body is set to it.
 const AIR: f32 = -1000.0;
-/// Passages narrower than twice this are closed when bone is filled, m: marrow reached through thin cortex.
-const BONE_REACH: f64 = 1.5e-3;
+/// Passages narrower than twice this are closed when bone is filled, m: marrow behind thin cortex, the brain behind the
+/// orbits' fissures, sinuses, the joint's and the teeth's gaps.
+const BONE_REACH: f64 = 3e-3;
 /// Passages narrower than twice this part inner from outer air, m: nostrils and the mouth.
 const AIR_REACH: f64 = 4e-3;
 /// How much further than the reach the regrown region is taken to touch the surface again.
@@ -133,28 +134,22 @@ pub(super) fn one_body(volume: &mut Volume, iso: f64) {
     }
 }
 
-/// Fills marrow and what else only narrow passages lead to with bone. Returns the number of samples filled.
-pub(super) fn solid_bones(volume: &mut Volume, skin: f64, bone: f64, to_bone: &Distance) -> usize {
+/// Fills marrow, sinuses, the skull's inside and whatever else only narrow passages lead to with bone. Returns the number of samples filled.
+pub(super) fn solid_bones(volume: &mut Volume, bone: f64, to_bone: &Distance) -> usize {
     let grid = &volume.grid;
-    let tissue = |at: usize| (skin..bone).contains(&f64::from(volume.samples[at]));
+    // Air that only narrow passages lead to is a sinus: it belongs to the bone as well.
+    let tissue = |at: usize| f64::from(volume.samples[at]) < bone;
     let wide = |at: usize| f64::from(volume.samples[at]) < bone && f64::from(to_bone.values[at]) > BONE_REACH;
-    // Seeds: everything with a wide passage to the largest wide region.
+    // Open is what the largest wide region (the air and the flesh of the face) leads to.
     let (number, sizes) = components(grid, wide);
     let Some(largest) = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k)) else { return 0 };
     let open: Vec<bool> = number.iter().map(|&n| n as usize == largest + 1).collect();
     let grown = grow(grid, &open, REGROW * BONE_REACH);
     let closed: Vec<usize> = (0..grid.len()).filter(|&at| tissue(at) && !grown[at]).collect();
-    // What is closed off but wide and large is a part of the tissue of its own (brain), not marrow: it stays.
-    let own = |at: usize| {
-        let n = number[at] as usize;
-        n != 0 && n != largest + 1 && sizes[n - 1] as f64 * grid.spacing.product() > 20e-6
-    };
-    let other: Vec<bool> = (0..grid.len()).map(own).collect();
-    let other = grow(grid, &other, REGROW * BONE_REACH);
-    let mut filled = 0;
-    for at in closed.into_iter().filter(|&at| !other[at]) {
+    let filled = closed.len();
+    for at in closed {
+        // As far beyond the threshold as it was below: the surface of the filling stays where the grown region ends.
         volume.samples[at] = (bone + (bone - f64::from(volume.samples[at])).clamp(20.0, 200.0)) as f32;
-        filled += 1;
     }
     filled
 }

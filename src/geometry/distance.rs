@@ -103,6 +103,24 @@ pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
     values
 }
 
+/// Length of the shortest way from the sources to every sample round what is blocked; beyond the blocks' surfaces it is
+/// carried on smoothly.
+pub(super) fn travel(grid: &Grid, sources: &[bool], blocked: &[bool]) -> Vec<f32> {
+    let mut values: Vec<f32> = sources.iter().map(|&s| if s { 0.0 } else { f32::INFINITY }).collect();
+    let fixed: Vec<bool> = sources.iter().zip(blocked).map(|(&s, &b)| s || b).collect();
+    // Ways wind round bones: each bend may need another round.
+    for _ in 0..2 * ROUNDS {
+        for direction in 0..8 {
+            sweep(grid, &mut values, &fixed, direction);
+        }
+    }
+    let known: Vec<bool> = blocked.iter().map(|&b| !b).collect();
+    for direction in 0..8 {
+        sweep(grid, &mut values, &known, direction);
+    }
+    values
+}
+
 /// One pass of |grad d| = 1 through the grid; bits of `direction` turn the axes round.
 fn sweep(grid: &Grid, values: &mut [f32], fixed: &[bool], direction: usize) {
     let [nx, ny, nz] = grid.dims;

@@ -2,11 +2,13 @@
 
 use super::SceneError;
 use super::check::Text;
-use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile};
+use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile, TissueSpec};
+use super::keys::find;
 use super::place::{area_shares, nearest_point, patch, volume_shares};
 use super::programme::{Programme, Track};
-use crate::effect::{DeadLoad, Elastic, Gravity, Inertia, Pressure, elastic_tissue, lumped_masses};
-use crate::fem::Term;
+use crate::effect::{self, DeadLoad, Elements, Gravity, Inertia, Law, Pressure, lumped_masses};
+use crate::energy::Lame;
+use crate::fem::{Term, add_midsides};
 use crate::math::Vec3;
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::{Causality, Port, Slot};
@@ -33,11 +35,11 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn build(&self, file: &SceneFile, mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
+    fn build(&self, file: &SceneFile, mut mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
         // Exhaustive, so that a new table cannot be forgotten here.
         let SceneFile {
             name,
-            mesh: _,
+            mesh: mesh_spec,
             tissue: _,
             bone,
             load,
@@ -51,7 +53,16 @@ impl Builder<'_> {
             keyframe: _,
         } = file;
         let mut warnings = Vec::new();
-        let (mut terms, density) = self.tissue(file, &mesh, &mut warnings)?;
+        let order = mesh_spec.get_ref().order.as_ref();
+        let midsides = match order.map_or(1, |o| *o.get_ref()) {
+            1 => Vec::new(),
+            2 => add_midsides(&mut mesh),
+            found => {
+                let at = order.map_or(0, |o| o.span().start);
+                return Err(self.text.at(at, format!("`order` of [mesh] is {found}; wanted 1 or 2")));
+            }
+        };
+        let (mut terms, density) = self.tissue(file, &mesh, &midsides, &mut warnings)?;
         let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
         let mut bones = self.bones(bone, &mesh, rings)?;
         if rings > 0 {
@@ -75,7 +86,7 @@ impl Builder<'_> {
             terms.push(Box::new(self.pressure(spec, &mesh, input)?));
             start[input] = self.text.number("pressure", "pressure", &spec.pressure)?.unwrap_or(0.0);
         }
-        let masses = || lumped_masses(&mesh, &density);
+        let masses = || lumped_masses(&mesh, &midsides, &density);
         if let Some(spec) = gravity {
             let input = layout.first(Slot::Gravity).expect("a scene with gravity has its port");
             let g = self.text.triple("gravity", "acceleration", &spec.acceleration)?.unwrap_or([0.0, 0.0, -9.80665]);
@@ -118,6 +129,7 @@ impl Builder<'_> {
         let model = Model::new(ModelParts {
             name: name.clone().unwrap_or_else(|| "scene".into()),
             mesh,
+            midsides,
             bones,
             loads,
             pressures,
@@ -143,6 +155,7 @@ impl Builder<'_> {
         &self,
         file: &SceneFile,
         mesh: &TetMesh,
+        midsides: &[[u32; 6]],
         warnings: &mut Vec<String>,
     ) -> Result<(Vec<Box<dyn Term>>, Vec<f64>), SceneError> {
         let mut material = vec![usize::MAX; mesh.region_names.len()];
@@ -170,28 +183,67 @@ impl Builder<'_> {
         let mut terms = Vec::new();
         let mut density = vec![0.0; mesh.region_names.len()];
         for (k, spec) in file.tissue.iter().enumerate() {
-            let energy = self.text.choice("tissue", "energy", &spec.energy)?.unwrap_or("stable-neo-hookean");
-            let law = Elastic {
-                energy,
-                E: self.text.checked("tissue", "E", &spec.E)?,
-                nu: self.text.checked("tissue", "nu", &spec.nu)?,
-            };
+            let (law, constants) = self.law(spec)?;
+            let Lame { mu, lambda } = (law.moduli)(&constants);
+            let nu = lambda / (2.0 * (lambda + mu));
             let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
-            if law.nu > LOCKING_NU {
+            if nu > LOCKING_NU && midsides.is_empty() {
                 warnings.push(format!(
-                    "nu = {} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too small and \
-                     forces too large",
-                    law.nu
+                    "Poisson's ratio {nu:.4} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too \
+                     small and forces too large; [mesh] order = 2 does not"
                 ));
             }
             let mine = |r: u32| material[r as usize] == k;
             density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
-            let tets = mesh.tets.iter().zip(&mesh.region).filter(|(_, r)| mine(**r)).map(|(t, _)| *t);
-            if tets.clone().next().is_some() {
-                terms.push(elastic_tissue(&law, &mesh.nodes, tets).expect("keys list the catalogue's energies"));
+            let elements: Vec<usize> = (0..mesh.tets.len()).filter(|&e| mine(mesh.region[e])).collect();
+            if !elements.is_empty() {
+                let tets: Vec<[u32; 4]> = elements.iter().map(|&e| mesh.tets[e]).collect();
+                let midsides: Vec<[u32; 6]> = elements.iter().filter_map(|&e| midsides.get(e).copied()).collect();
+                terms.push((law.term)(&constants, Elements { X: &mesh.nodes, tets: &tets, midsides: &midsides }));
             }
         }
         Ok((terms, density))
+    }
+
+    /// The law of a material and its constants, in the law's order.
+    fn law(&self, spec: &TissueSpec) -> Result<(&'static Law, Vec<Vec<f64>>), SceneError> {
+        let name = self.text.choice("tissue", "energy", &spec.energy)?.unwrap_or("stable-neo-hookean");
+        let law = effect::law(name).expect("keys list the catalogue's laws");
+        let wants = || law.keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
+        let mut constants: Vec<Vec<f64>> = vec![Vec::new(); law.keys.len()];
+        for (key, value) in spec.constants() {
+            let Some(value) = value else { continue };
+            let Some(k) = law.keys.iter().position(|wanted| *wanted == key) else {
+                return Err(self
+                    .text
+                    .at(value.span().start, format!("`{key}` is no constant of `{name}`, which takes {}", wants())));
+            };
+            let values = value.get_ref().values();
+            if let Some(bad) = values.iter().find(|v| !find("tissue", key).range.holds(**v)) {
+                return Err(self.text.out_of_range("tissue", key, value, bad));
+            }
+            if values.is_empty() || (values.len() > 1 && name != "ogden") {
+                return Err(self
+                    .text
+                    .at(value.span().start, format!("`{key}` of `{name}` is {} numbers; wanted one", values.len())));
+            }
+            constants[k] = values;
+        }
+        let place = spec.energy.as_ref().map_or(0, |e| e.span().start);
+        if let Some(k) = constants.iter().position(Vec::is_empty) {
+            let message = format!("`{name}` takes {}; `{}` is missing", wants(), law.keys[k]);
+            return Err(self.text.at(place, message));
+        }
+        if name == "ogden"
+            && (constants[0].len() != constants[1].len()
+                || constants[1].contains(&0.0)
+                || constants[0].iter().sum::<f64>() <= 0.0)
+        {
+            let message =
+                "`ogden` takes as many `mu` as `alpha`, no `alpha` of zero, and `mu` whose sum is positive".to_owned();
+            return Err(self.text.at(place, message));
+        }
+        Ok((law, constants))
     }
 
     /// Bones and their nodes. With `rings` > 0 a node that two bones claim belongs to neither.

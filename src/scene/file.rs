@@ -39,6 +39,7 @@ pub struct MeshSpec {
     pub file: Option<String>,
     pub head: Option<HeadSpec>,
     pub block: Option<BlockSpec>,
+    pub order: Option<Spanned<u32>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -64,9 +65,57 @@ pub struct TissueSpec {
     pub regions: Option<Vec<Spanned<String>>>,
     pub energy: Option<Spanned<String>>,
     #[serde(rename = "E")]
-    pub E: Spanned<f64>,
-    pub nu: Spanned<f64>,
+    pub E: Option<Spanned<Constant>>,
+    pub nu: Option<Spanned<Constant>>,
+    pub mu: Option<Spanned<Constant>>,
+    pub alpha: Option<Spanned<Constant>>,
+    pub b: Option<Spanned<Constant>>,
+    pub c1: Option<Spanned<Constant>>,
+    pub c2: Option<Spanned<Constant>>,
+    pub c10: Option<Spanned<Constant>>,
+    pub c01: Option<Spanned<Constant>>,
+    pub c20: Option<Spanned<Constant>>,
+    pub c30: Option<Spanned<Constant>>,
+    pub kappa: Option<Spanned<Constant>>,
     pub density: Option<Spanned<f64>>,
+}
+
+impl TissueSpec {
+    /// The constants that stand in the table, by key.
+    pub fn constants(&self) -> [(&'static str, &Option<Spanned<Constant>>); 12] {
+        let Self { regions: _, energy: _, E, nu, mu, alpha, b, c1, c2, c10, c01, c20, c30, kappa, density: _ } = self;
+        [
+            ("E", E),
+            ("nu", nu),
+            ("mu", mu),
+            ("alpha", alpha),
+            ("b", b),
+            ("c1", c1),
+            ("c2", c2),
+            ("c10", c10),
+            ("c01", c01),
+            ("c20", c20),
+            ("c30", c30),
+            ("kappa", kappa),
+        ]
+    }
+}
+
+/// One number, or several for laws of several terms.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged)]
+pub enum Constant {
+    One(f64),
+    Many(Vec<f64>),
+}
+
+impl Constant {
+    pub fn values(&self) -> Vec<f64> {
+        match self {
+            Constant::One(v) => vec![*v],
+            Constant::Many(v) => v.clone(),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -31,6 +31,11 @@ pub enum MeshSource {
 }
 
 impl SceneFile {
+    /// Order of the elements, if the scene names one.
+    pub fn order(&self) -> Option<u32> {
+        self.mesh.get_ref().order.as_ref().map(|o| *o.get_ref())
+    }
+
     /// Where the mesh comes from.
     ///
     /// # Errors
@@ -38,11 +43,11 @@ impl SceneFile {
     pub fn mesh_source(&self, text: &str) -> Result<MeshSource, SceneError> {
         let text = Text(text);
         match self.mesh.get_ref() {
-            MeshSpec { file: Some(file), head: None, block: None } => Ok(MeshSource::File(file.clone())),
-            MeshSpec { file: None, head: Some(head), block: None } => {
+            MeshSpec { file: Some(file), head: None, block: None, .. } => Ok(MeshSource::File(file.clone())),
+            MeshSpec { file: None, head: Some(head), block: None, .. } => {
                 Ok(MeshSource::Head { edge: text.number("mesh.head", "edge", &head.edge)? })
             }
-            MeshSpec { file: None, head: None, block: Some(block) } => {
+            MeshSpec { file: None, head: None, block: Some(block), .. } => {
                 let size = text.vector("mesh.block", "size", &block.size)?;
                 if let Some(n) = block.cells.get_ref().iter().find(|n| **n < 1) {
                     return Err(text.out_of_range("mesh.block", "cells", &block.cells, n));

@@ -70,6 +70,8 @@ pub struct ModelParts {
     pub name: String,
     /// The tissue.
     pub mesh: TetMesh,
+    /// Mid-edge nodes of each tetrahedron; empty for linear elements.
+    pub midsides: Vec<[u32; 6]>,
     /// Bones, in the order of the ports' rows; no node belongs to two.
     pub bones: Vec<Bone>,
     /// Names of the force loads, in order.
@@ -227,6 +229,9 @@ fn check_held(parts: &ModelParts, dofs: &Dofs) -> Result<(), Unconstrained> {
     let mut piece = DisjointSets::new(n);
     for tet in &parts.mesh.tets {
         tet.iter().for_each(|&a| piece.join(tet[0], a));
+    }
+    for (tet, midsides) in parts.mesh.tets.iter().zip(&parts.midsides) {
+        midsides.iter().for_each(|&a| piece.join(tet[0], a));
     }
     for body in &dofs.bodies {
         body.nodes.iter().for_each(|&a| piece.join(body.nodes[0], a));

@@ -53,8 +53,38 @@ fn clean_head_without_labels_in_release() {
     let baked = run(&volume, None, &options, "clean_bare");
     assert!(count(&baked, "skull") > 500 && count(&baked, "mandible") > 300);
     assert!(baked.warnings.iter().any(|w| matches!(w, Warning::Thin { .. })));
+    if let Some(labels) = data("cthead_unc_labels.nii.gz") {
+        let labels = read_labels(&labels).unwrap();
+        // A bone node lies on the bone's surface: the labels round it name the bone, 2 skull, 3 mandible, 4 spine (which
+        // without labels counts as skull).
+        let share = |name: &str, wanted: [u8; 2]| {
+            let nodes = &baked.mesh.node_set(name).unwrap().nodes;
+            let around = |a: &&u32| {
+                let x = baked.mesh.nodes[**a as usize];
+                (0..27).any(|k| {
+                    let step = nalgebra::Vector3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1).map(|c| 2e-3 * f64::from(c));
+                    wanted.contains(&labels.at(&(x + step)))
+                })
+            };
+            nodes.iter().filter(around).count() as f64 / nodes.len() as f64
+        };
+        let (skull, mandible) = (share("skull", [2, 4]), share("mandible", [3, 3]));
+        println!("labels agree: skull {skull:.3}, mandible {mandible:.3}");
+        assert!(skull > 0.85 && mandible > 0.95);
+    }
     let again = bake(&volume, None, &options, &mut |_, _| {}).unwrap();
     assert_eq!(again.mesh, baked.mesh);
+}
+
+#[test]
+fn lower_face_crop_bakes_too_in_release() {
+    let (Some(crop), Some(labels)) = (data("cthead_face_bench.nii.gz"), data("cthead_face_bench_labels.nii.gz")) else { return };
+    let (volume, labels) = (read_volume(&crop).unwrap(), read_labels(&labels).unwrap());
+    let [low, high] = volume.grid.bounds();
+    let options = BakeOptions { roi: Some([low, high]), depth: 1.0, ..BakeOptions::default() };
+    let baked = run(&volume, Some(&labels), &options, "crop");
+    assert!((130_000..165_000).contains(&baked.report.tets));
+    assert!(count(&baked, "mandible") > 1000);
 }
 
 #[test]

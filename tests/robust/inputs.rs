@@ -1,15 +1,22 @@
 //! Inputs that cannot be simulated are refused with their name; the state stays at the last accepted step.
 
-use crate::common::{get, port, set, sim};
+use cutis::effect::law;
 
-pub const BLOCK: &str = "[mesh.block]\nsize = [0.06, 0.04, 0.03]\ncells = [6, 4, 3]\n\
-                         [[tissue]]\nenergy = \"ENERGY\"\nE = 15e3\nnu = 0.45\n\
-                         [[bone]]\nname = \"skull\"\nnodes = \"x_min\"\n[[bone]]\nname = \"mandible\"\nnodes = \"x_max\"\n\
-                         [[load]]\nname = \"push\"\nat = [0.03, 0.02, 0.03]\nradius = 0.01\n";
+use crate::common::{get, port, set, sim, tissue};
+
+/// A block between two bones with a load on its top.
+pub fn block(energy: &str) -> String {
+    format!(
+        "[mesh.block]\nsize = [0.06, 0.04, 0.03]\ncells = [6, 4, 3]\n[[tissue]]\n{}\
+         [[bone]]\nname = \"skull\"\nnodes = \"x_min\"\n[[bone]]\nname = \"mandible\"\nnodes = \"x_max\"\n\
+         [[load]]\nname = \"push\"\nat = [0.03, 0.02, 0.03]\nradius = 0.01\n",
+        tissue(law(energy).expect("a law of the catalogue"), 15e3)
+    )
+}
 
 #[test]
 fn nan_and_infinite_inputs_are_named_and_change_nothing() {
-    let mut sim = sim(&BLOCK.replace("ENERGY", "stable-neo-hookean"));
+    let mut sim = sim(&block("stable-neo-hookean"));
     set(&mut sim, "bone.translation", 3, &[0.002, 0.0, 0.0]);
     sim.step(0.1).expect("a step");
     let (before, t) = (get(&sim, "skin.position"), sim.time());
@@ -25,7 +32,7 @@ fn nan_and_infinite_inputs_are_named_and_change_nothing() {
 
 #[test]
 fn steps_of_no_length_are_refused() {
-    let mut sim = sim(&BLOCK.replace("ENERGY", "linear"));
+    let mut sim = sim(&block("linear"));
     for dt in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(sim.step(dt).unwrap_err().to_string().contains("positive, finite"));
     }
@@ -34,7 +41,7 @@ fn steps_of_no_length_are_refused() {
 
 #[test]
 fn wrong_ports_and_ranges_are_refused() {
-    let mut sim = sim(&BLOCK.replace("ENERGY", "linear"));
+    let mut sim = sim(&block("linear"));
     let skin = port(&sim, "skin.position");
     assert!(sim.set_f64(skin, 0, &[0.0]).unwrap_err().to_string().contains("settable"));
     let translation = port(&sim, "bone.translation");

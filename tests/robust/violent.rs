@@ -1,13 +1,14 @@
 //! Violent motion ends in an equilibrium or in a clear error, never in a NaN, and the way back leads to rest.
 
-use cutis::effect::ENERGIES;
+use cutis::effect::LAWS;
 
-use super::inputs::BLOCK;
+use super::inputs::block;
 use crate::common::{get, largest, set, sim};
 
 #[test]
 fn huge_motion_and_force_end_in_an_answer_or_an_error() {
-    for (energy, _) in ENERGIES {
+    for law in LAWS {
+        let energy = law.name;
         for (name, values) in [
             ("bone.translation", vec![0.0, 0.0, 0.0, 0.05, 0.0, 0.0]),
             ("bone.translation", vec![0.0, 0.0, 0.0, 0.0, 0.05, 0.05]),
@@ -18,7 +19,7 @@ fn huge_motion_and_force_end_in_an_answer_or_an_error() {
             ("load.force", vec![0.0, 0.0, -5.0]),
             ("load.force", vec![1e4, 0.0, 1e4]),
         ] {
-            let mut sim = sim(&BLOCK.replace("ENERGY", energy));
+            let mut sim = sim(&block(energy));
             set(&mut sim, name, 0, &values);
             let outcome = sim.step(0.1);
             let x = get(&sim, "skin.position");
@@ -32,8 +33,8 @@ fn huge_motion_and_force_end_in_an_answer_or_an_error() {
 
 #[test]
 fn a_bone_jump_of_five_centimetres_and_a_right_angle_is_solved() {
-    for energy in ["corotational", "stable-neo-hookean", "neo-hookean"] {
-        let mut sim = sim(&BLOCK.replace("ENERGY", energy));
+    for energy in ["corotational", "stable-neo-hookean", "neo-hookean", "yeoh", "fung", "ogden"] {
+        let mut sim = sim(&block(energy));
         set(&mut sim, "bone.translation", 3, &[0.05, 0.0, 0.0]);
         set(&mut sim, "bone.rotation", 3, &[1.5708, 0.0, 0.0]);
         let report = sim.step(0.1).unwrap_or_else(|e| panic!("{energy}: {e}"));
@@ -43,8 +44,9 @@ fn a_bone_jump_of_five_centimetres_and_a_right_angle_is_solved() {
 
 #[test]
 fn unloading_leads_back_to_rest() {
-    for (energy, _) in ENERGIES {
-        let mut sim = sim(&BLOCK.replace("ENERGY", energy));
+    for law in LAWS {
+        let energy = law.name;
+        let mut sim = sim(&block(energy));
         set(&mut sim, "bone.translation", 3, &[0.01, 0.005, 0.0]);
         set(&mut sim, "load.force", 0, &[0.0, 0.0, -0.3]);
         sim.step(0.1).unwrap_or_else(|e| panic!("{energy}: {e}"));

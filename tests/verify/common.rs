@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use cutis::effect::Law;
 use cutis::math::{Mat3, Vec3};
 use cutis::sim::Sim;
 
@@ -53,4 +54,36 @@ pub fn rows(values: &[f64]) -> Vec<Vec3> {
 
 pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+/// Constants of a law at a stiffness of about `E` Pa and a Poisson's ratio of 0.4, in the law's order.
+pub fn constants(law: &Law, E: f64) -> Vec<Vec<f64>> {
+    let mu = E / 2.8;
+    let of = |key: &&str| match (*key, law.name) {
+        ("E", _) => vec![E],
+        ("nu", _) => vec![0.4],
+        ("mu", "ogden") => vec![0.7 * mu, 0.3 * mu],
+        ("alpha", _) => vec![5.0, -2.0],
+        ("mu", _) => vec![mu],
+        ("b", _) => vec![2.0],
+        ("c10", "yeoh") => vec![0.5 * mu],
+        ("c10", _) => vec![0.4 * mu],
+        ("c01", _) => vec![0.1 * mu],
+        ("c20", _) => vec![0.3 * mu],
+        ("c30", _) => vec![0.1 * mu],
+        ("c1", _) => vec![mu / 1.5],
+        ("c2", _) => vec![1.5],
+        ("kappa", _) => vec![mu * 14.0 / 3.0],
+        (key, law) => panic!("no sample for {key} of {law}"),
+    };
+    law.keys.iter().map(of).collect()
+}
+
+/// The same as lines of a `[[tissue]]`.
+pub fn tissue(law: &Law, E: f64) -> String {
+    let lines = law.keys.iter().zip(constants(law, E)).map(|(key, v)| match v[..] {
+        [one] => format!("{key} = {one:?}\n"),
+        _ => format!("{key} = {v:?}\n"),
+    });
+    format!("energy = \"{}\"\n{}", law.name, lines.collect::<String>())
 }

@@ -1,9 +1,13 @@
 //! Rest is free of stress, rotations change nothing, tangents are symmetric, small strains return mu and lambda.
 
-use cutis::energy::{Corotational, Energy, Lame, Linear, NeoHookean, StVenantKirchhoff, StableNeoHookean};
+use cutis::effect::LAWS;
+use cutis::energy::{
+    Corotational, Energy, Fung, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, StableNeoHookean,
+    Stretches, VerondaWestmann, WithBulk, Yeoh,
+};
 use cutis::math::{Mat3, clamp_eigenvalues, exp_rotation, outer};
 
-use crate::common::Random;
+use crate::common::{Random, constants};
 
 const LAME: Lame = Lame { mu: 3.0, lambda: 7.0 };
 
@@ -46,6 +50,12 @@ fn energies_obey_the_laws_of_elasticity() {
     check(&StVenantKirchhoff(LAME), true);
     check(&StableNeoHookean(LAME), true);
     check(&NeoHookean(LAME), true);
+    let kappa = LAME.lambda + 2.0 / 3.0 * LAME.mu;
+    check(&WithBulk { law: MooneyRivlin { c10: 0.4 * LAME.mu, c01: 0.1 * LAME.mu }, kappa }, true);
+    check(&WithBulk { law: Yeoh { c10: 0.5 * LAME.mu, c20: 0.2, c30: 0.1 }, kappa }, true);
+    check(&WithBulk { law: Fung { mu: LAME.mu, b: 2.0 }, kappa }, true);
+    check(&WithBulk { law: VerondaWestmann { c1: LAME.mu / 2.0, c2: 2.0 }, kappa }, true);
+    check(&Stretches(Ogden { terms: vec![(2.0, 4.0), (1.0, -2.0)], kappa }), true);
 }
 
 #[test]
@@ -67,4 +77,13 @@ fn lame_constants_come_from_young_and_poisson() {
     let lame = Lame::new(15e3, 0.45);
     let young = lame.mu * (3.0 * lame.lambda + 2.0 * lame.mu) / (lame.lambda + lame.mu);
     assert!((young - 15e3).abs() < 1e-9 && (lame.lambda / (2.0 * (lame.lambda + lame.mu)) - 0.45).abs() < 1e-15);
+}
+
+#[test]
+fn the_catalogue_says_the_moduli_that_its_laws_have() {
+    for law in LAWS {
+        let Lame { mu, lambda } = (law.moduli)(&constants(law, 15e3));
+        let nu = lambda / (2.0 * (lambda + mu));
+        assert!((nu - 0.4).abs() < 0.02 && (mu * 2.8 / 15e3 - 1.0).abs() < 0.02, "{}: mu {mu}, nu {nu}", law.name);
+    }
 }

@@ -1,16 +1,17 @@
 //! Bones: rigid motion, force-driven bodies, reactions.
 
-use cutis::effect::ENERGIES;
+use cutis::effect::{LAWS, law};
 use cutis::math::{Vec3, exp_rotation};
 
-use crate::common::{get, largest, rows, set, sim};
+use crate::common::{get, largest, rows, set, sim, tissue};
 
 fn jaw(energy: &str, mandible: &str) -> String {
     format!(
         "[mesh.block]\nsize = [0.06, 0.04, 0.03]\ncells = [6, 4, 3]\n\
-         [[tissue]]\nenergy = \"{energy}\"\nE = 15e3\nnu = 0.4\n\
+         [[tissue]]\n{}\
          [[bone]]\nname = \"skull\"\nnodes = \"x_min\"\npivot = [0, 0, 0]\n\
-         [[bone]]\nname = \"mandible\"\nnodes = \"x_max\"\npivot = [0.06, 0.02, 0.01]\n{mandible}\n[solver]\ntolerance = 1e-10\n"
+         [[bone]]\nname = \"mandible\"\nnodes = \"x_max\"\npivot = [0.06, 0.02, 0.01]\n{mandible}\n[solver]\ntolerance = 1e-10\n",
+        tissue(law(energy).expect("a law of the catalogue"), 15e3)
     )
 }
 
@@ -18,7 +19,7 @@ fn jaw(energy: &str, mandible: &str) -> String {
 fn rigid_motion_of_all_bones_moves_everything_rigidly() {
     // A right angle in one step, and a turn beyond half a turn.
     for w in [Vec3::new(0.0, 0.0, 1.6), Vec3::new(2.0, -2.0, 1.5)] {
-        for (energy, _) in ENERGIES.iter().filter(|(name, _)| *name != "linear") {
+        for energy in LAWS.iter().map(|l| l.name).filter(|name| *name != "linear") {
             let mut sim = sim(&jaw(energy, "drive = \"pose\"").replace("[0.06, 0.02, 0.01]", "[0, 0, 0]"));
             let t = Vec3::new(0.3, -0.1, 0.2);
             set(&mut sim, "bone.translation", 0, &[t.x, t.y, t.z, t.x, t.y, t.z]);
@@ -36,7 +37,7 @@ fn rigid_motion_of_all_bones_moves_everything_rigidly() {
 
 #[test]
 fn a_force_driven_bone_finds_the_pose_that_a_pose_driven_one_gets_by_its_reaction() {
-    for energy in ["linear", "corotational", "stable-neo-hookean", "neo-hookean"] {
+    for energy in LAWS.iter().map(|l| l.name) {
         let mut driven = sim(&jaw(energy, "drive = \"pose\""));
         let (t, w) = ([0.002, -0.001, 0.003], [0.05, 0.08, -0.04]);
         set(&mut driven, "bone.translation", 3, &t);
