@@ -6,7 +6,7 @@
     cutis fmu fmu/scene.toml -o target/fmu
     python examples/drive_fmu.py target/fmu/cutis.fmu
 
-Number to expect: the skin moves 2.0 mm at most when the jaw goes down 2.0 mm.
+Number to expect: some point of the skin has moved 2.1 mm when the jaw has gone down 2.0 mm.
 """
 
 import sys
@@ -18,7 +18,8 @@ STEPS, DT = 8, 1 / 64
 
 archive = sys.argv[1] if len(sys.argv) > 1 else "target/fmu/cutis.fmu"
 variables = {v.name: v for v in fmpy.read_model_description(archive).modelVariables}
-inputs = [v for v in variables.values() if v.causality == "input" and v.name.startswith("bone.")]
+bones = variables["bone.translation"].shape  # this importer stacks inputs, so it takes those of one shape
+inputs = [v for v in variables.values() if v.causality == "input" and v.shape == bones]
 
 signals = np.zeros(STEPS + 1, dtype=[("time", "f8")] + [(v.name, "f8", tuple(v.shape)) for v in inputs])
 signals["time"] = DT * np.arange(STEPS + 1)

@@ -380,7 +380,7 @@ MISUSE = {
     "state of a flipped bit": "s = bytearray(host.fmu.serializeFMUState(host.fmu.getFMUState())); s[99] ^= 4; refused(lambda: host.fmu.deserializeFMUState(bytes(s)))",
     "foreign state": "refused(lambda: host.fmu.setFMUState(c_void_p(4096)))",
     "free nothing": "host.fmu.fmi3FreeInstance(None)",
-    "a huge motion": "host.initialise(); host.set('bone.translation', 10 * np.ones(host.shape('bone.translation')) * [[i] for i in range(host.shape('bone.translation')[0])]); refused(lambda: host.step(0.0, 0.1), also_fine=True)",
+    "a huge motion": "host.initialise(); host.set('bone.translation', 0.3 * np.ones(host.shape('bone.translation')) * [[i] for i in range(host.shape('bone.translation')[0])]); refused(lambda: host.step(0.0, 0.1), also_fine=True)",
 }
 
 
