@@ -11,8 +11,8 @@ use crate::math::Vec3;
 
 /// Exact distances reach this many voxels from each triangle's box.
 const BAND: f64 = 1.5;
-/// Sweeps in eight directions, this many times; twice suffices away from strong bends.
-const ROUNDS: usize = 2;
+/// Rounds of sweeps in eight directions for ways that wind round bones; straight ways need one.
+const WINDING_ROUNDS: usize = 4;
 
 /// A signed distance sampled on a grid, m; negative where the body is.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,11 +95,7 @@ pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
         }
     }
     let fixed: Vec<bool> = values.iter().map(|v| v.is_finite()).collect();
-    for _ in 0..ROUNDS {
-        for direction in 0..8 {
-            sweep(grid, &mut values, &fixed, direction);
-        }
-    }
+    (0..8).for_each(|direction| sweep(grid, &mut values, &fixed, direction));
     values
 }
 
@@ -109,7 +105,7 @@ pub(super) fn travel(grid: &Grid, sources: &[bool], blocked: &[bool]) -> Vec<f32
     let mut values: Vec<f32> = sources.iter().map(|&s| if s { 0.0 } else { f32::INFINITY }).collect();
     let fixed: Vec<bool> = sources.iter().zip(blocked).map(|(&s, &b)| s || b).collect();
     // Ways wind round bones: each bend may need another round.
-    for _ in 0..2 * ROUNDS {
+    for _ in 0..WINDING_ROUNDS {
         for direction in 0..8 {
             sweep(grid, &mut values, &fixed, direction);
         }
