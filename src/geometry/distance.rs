@@ -78,6 +78,8 @@ pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
     let local: Vec<Vec3> = surface.vertices.iter().map(|v| grid.coordinates(v).component_mul(&grid.spacing)).collect();
     for t in &surface.triangles {
         let corners = t.map(|a| local[a as usize]);
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius = corners.iter().fold(0.0, |r: f64, c| r.max((c - centre).norm()));
         let low = corners[0].inf(&corners[1]).inf(&corners[2]) - reach;
         let high = corners[0].sup(&corners[1]).sup(&corners[2]) + reach;
         let bound = |x: f64, a: usize| (x / grid.spacing[a]).clamp(0.0, grid.dims[a] as f64 - 1.0);
@@ -87,9 +89,11 @@ pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
             for j in first[1]..=last[1] {
                 for i in first[0]..=last[0] {
                     let p = Vec3::new(i as f64, j as f64, k as f64).component_mul(&grid.spacing);
-                    let d = (nearest_on_triangle(&p, corners) - p).norm() as f32;
                     let value = &mut values[grid.index([i, j, k])];
-                    *value = value.min(d);
+                    // No point of the triangle is nearer than its bounding ball.
+                    if (p - centre).norm() - radius < f64::from(*value) {
+                        *value = value.min((nearest_on_triangle(&p, corners) - p).norm() as f32);
+                    }
                 }
             }
         }
