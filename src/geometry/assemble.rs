@@ -1,10 +1,10 @@
 //! From stuffed tetrahedra to a mesh that scenes can name: slit, face sets, bones, what is released.
 
+use super::Field;
+use super::repair::compact;
 use super::stencils::Stuffed;
 use super::stuffing::{NO_WALL, Wall};
-use super::repair::compact;
 use super::topology::{FACES, OPEN, components, fans, neighbours, stars};
-use super::Field;
 use crate::math::Vec3;
 use crate::mesh::{FaceSet, NodeSet, SKIN, TetMesh};
 
@@ -169,7 +169,8 @@ fn open(stuffed: &mut Stuffed, slit: Slit) -> (Vec<[u32; 3]>, usize) {
     });
     opened.retain(|t| !t.contains(&OPEN));
     opened.sort_unstable();
-    let mut places: Vec<[u64; 3]> = stuffed.nodes.iter().map(|x| [x.x, x.y, x.z].map(|c| (c + 0.0).to_bits())).collect();
+    let mut places: Vec<[u64; 3]> =
+        stuffed.nodes.iter().map(|x| [x.x, x.y, x.z].map(|c| (c + 0.0).to_bits())).collect();
     places.sort_unstable();
     let doubled = places.windows(2).filter(|w| w[0] == w[1]).count();
     (opened, doubled)

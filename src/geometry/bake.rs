@@ -1,15 +1,15 @@
 //! From a head CT to a mesh of the face: region, surfaces, bones, tetrahedra, slit, layers, and what to beware of.
 
-use std::fmt;
-
 use super::assemble::{Assembled, Bone, Kind, Naming, assemble};
-use super::distance::{travel, unsigned};
 use super::clean::{crop, flood, one_body, outer_air, solid_bones};
+use super::distance::{travel, unsigned};
 use super::label::{LayerShare, Layers};
 use super::separate::{BONES, bone_map};
 use super::stuffing::{Side, Wall};
+use super::warning::{Under, Warning, thin};
 use super::{
-    Cuboid, Distance, Field, Isosurface, Labels, Lattice, MeshReport, MeshingError, Nearest, Sizing, Surface, Volume, stuff,
+    Cuboid, Distance, Field, Isosurface, Labels, Lattice, MeshReport, MeshingError, Nearest, Sizing, Surface, Volume,
+    stuff,
 };
 use crate::math::Vec3;
 use crate::mesh::{SKIN, TetMesh};
@@ -20,13 +20,8 @@ const FACE: [[f64; 3]; 2] = [[-0.086, -0.006, -0.096], [0.086, 0.122, 0.082]];
 const MARGIN: f64 = 0.010;
 /// Rim of the region left out of the distances reported, m: there the lattice meets the cut planes.
 const RIM: f64 = 0.005;
-/// Tissue thinner than this many lattice edges is warned of.
-const THIN: f64 = 2.0;
 /// Thickened tissue is this many edges thick: a lattice breaks through thinner layers.
 const THICK: f64 = 1.7;
-/// Thin places are gathered over cells of this size, m; the worst ones are told.
-const THIN_CELL: f64 = 0.02;
-const THIN_TOLD: usize = 12;
 /// Hounsfield units below which tissue under the skin is fat.
 const FAT_HU: f64 = -10.0;
 /// Half width and half height of the mouth, and how far behind the front of the teeth the slit may reach, m.
@@ -78,60 +73,6 @@ impl Default for BakeOptions {
     }
 }
 
-/// Something the user should know about a mesh that was made.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Warning {
-    /// Tissue thinner than the lattice resolves: missing, or thickened into the bone.
-    Thin {
-        /// Thinnest place, LPS, m.
-        place: Vec3,
-        /// Thickness there, m.
-        thickness: f64,
-        /// Skin area about it that is thinner than twice the edge, m2.
-        area: f64,
-        /// Whether the mesh was thickened there.
-        thickened: bool,
-    },
-    /// More thin places than were told one by one.
-    MoreThin {
-        /// How many.
-        places: usize,
-        /// Their skin area, m2.
-        area: f64,
-    },
-    /// Skull and mandible hang together: the jaw cannot move.
-    JawNotFound,
-    /// No slit was cut.
-    NoSlit,
-    /// Loose pieces that were left out.
-    Dropped {
-        /// How many.
-        pieces: usize,
-        /// Their volume, m3.
-        volume: f64,
-    },
-    /// A layer that the mesh is too coarse for.
-    Layer(LayerShare),
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Thin { place, thickness, area, thickened } => {
-                let p = place * 1e3;
-                let (t, a) = (thickness * 1e3, area * 1e4);
-                let fate = if *thickened { "the mesh is thicker there than the tissue" } else { "it may be missing" };
-                write!(f, "thin tissue: {t:.1} mm at ({:.1}, {:.1}, {:.1}) mm LPS, {a:.1} cm2 about it; {fate}: choose a shorter edge", p.x, p.y, p.z)
-            }
-            Self::MoreThin { places, area } => write!(f, "thin tissue at {places} more places, {:.1} cm2", area * 1e4),
-            Self::JawNotFound => write!(f, "skull and mandible could not be told apart: all bone is `skull`; give a labels file"),
-            Self::NoSlit => write!(f, "no oral slit was cut: no faces between the jaws in the mouth's box; give the box of the mouth"),
-            Self::Dropped { pieces, volume } => write!(f, "{pieces} loose piece(s) of {:.2} mL left out", volume * 1e6),
-            Self::Layer(s) => write!(f, "layer `{}` takes {:.1} % of the volume, by depth it should take {:.1} %: choose a shorter edge", s.name, s.reached * 100.0, s.wanted * 100.0),
-        }
-    }
-}
-
 /// A mesh of the face and what is known about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baked {
@@ -162,8 +103,14 @@ pub fn bake(
     progress: &mut dyn FnMut(&str, f64),
 ) -> Result<Baked, MeshingError> {
     progress("region", 0.0);
+    if options.skin_hu >= options.bone_hu {
+        return Err(MeshingError::Thresholds { skin: options.skin_hu, bone: options.bone_hu });
+    }
     let nose = nose_tip(volume, options)?;
     let region = region(volume, options, &nose)?;
+    if let Some(labels) = labels {
+        covered(labels, &region)?;
+    }
     let mut part = part_of(volume, &region);
     progress("surfaces", 0.05);
     one_body(&mut part, options.skin_hu);
@@ -178,7 +125,7 @@ pub fn bake(
         return Err(empty("skin", options.skin_hu, &part));
     }
     let outer = outer_air(&part, options.skin_hu, &to_skin);
-    let outer_skin = outer_part(&to_skin.surface, &part, &outer);
+    let outer_skin = skin_part(&to_skin.surface, &part, &outer, true);
     let under = if options.thicken { unsigned(&part.grid, &outer_skin) } else { Vec::new() };
     let deep = deep(&part, options, &outer, &to_bone);
     progress("bones", 0.45);
@@ -235,7 +182,9 @@ pub fn bake(
     for &k in present.iter().filter(|&&k| mesh.face_set(BONES[k]).is_some()) {
         report.measure_surface(&mesh, BONES[k], &beside(&bone_surfaces[k], &part, &reached), &inner);
     }
-    let mut warnings = thin(&outer_skin, &to_bone, options.edge, &inner, options.thicken);
+    let inner_skin = skin_part(&to_skin.surface, &part, &outer, false);
+    let under = Under { to_bone: &to_bone, inner: &inner_skin, bins: Nearest::new(&inner_skin, options.edge) };
+    let mut warnings = thin(&outer_skin, &under, options.edge, options.thicken, &inner);
     if !told {
         warnings.push(Warning::JawNotFound);
     }
@@ -282,12 +231,25 @@ fn region(volume: &Volume, options: &BakeOptions, nose: &Vec3) -> Result<Cuboid,
     Ok(region)
 }
 
+/// Whether the labels lie where the region is.
+fn covered(labels: &Labels, region: &Cuboid) -> Result<(), MeshingError> {
+    let [low, high] = labels.grid.bounds();
+    let slack = 2.0 * labels.grid.spacing.max();
+    let misses = (0..3).any(|a| low[a] > region.low[a] + slack || high[a] < region.high[a] - slack);
+    if misses {
+        let corners = |low: Vec3, high: Vec3| [low.into(), high.into()];
+        return Err(MeshingError::Labels { region: corners(region.low, region.high), labels: corners(low, high) });
+    }
+    Ok(())
+}
+
 /// The samples of a volume in and round a region.
 fn part_of(volume: &Volume, region: &Cuboid) -> Volume {
     let grid = &volume.grid;
     let far = Vec3::repeat(f64::INFINITY);
     let (low, high) = (0..8).fold((far, -far), |(low, high), corner| {
-        let p = Vec3::from_fn(|a, _| if corner >> a & 1 == 0 { region.low[a] - MARGIN } else { region.high[a] + MARGIN });
+        let p =
+            Vec3::from_fn(|a, _| if corner >> a & 1 == 0 { region.low[a] - MARGIN } else { region.high[a] + MARGIN });
         let c = grid.coordinates(&p);
         (low.inf(&c), high.sup(&c))
     });
@@ -347,9 +309,10 @@ fn compacted(surface: &Surface, mut triangles: Vec<[u32; 3]>) -> Surface {
     Surface { vertices, triangles }
 }
 
-fn outer_part(surface: &Surface, part: &Volume, outer: &[bool]) -> Surface {
+/// The part of the skin that faces outer air, or that which does not.
+fn skin_part(surface: &Surface, part: &Volume, outer: &[bool], wanted: bool) -> Surface {
     let is_outer = |t: &[u32; 3]| outer[part.grid.index(part.grid.nearest(&surface.vertices[t[0] as usize]))];
-    compacted(surface, surface.triangles.iter().filter(|t| is_outer(t)).copied().collect())
+    compacted(surface, surface.triangles.iter().filter(|t| is_outer(t) == wanted).copied().collect())
 }
 
 /// The box of the mouth: given, or about the front teeth, where skull and mandible come nearest near the median plane.
@@ -362,7 +325,9 @@ fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, told: bool) -
     }
     let near = |p: &&Vec3| (p.x - nose.x).abs() < 0.012 && p.z < nose.z - 0.012 && p.z > nose.z - 0.085;
     let front = |s: &Surface| s.vertices.iter().filter(near).map(|p| p.y).fold(f64::INFINITY, f64::min);
-    let teeth = |s: &Surface, y: f64| s.vertices.iter().filter(near).filter(|p| p.y < y + 0.012).map(|p| p.z).collect::<Vec<_>>();
+    let teeth = |s: &Surface, y: f64| {
+        s.vertices.iter().filter(near).filter(|p| p.y < y + 0.012).map(|p| p.z).collect::<Vec<_>>()
+    };
     let (upper_y, lower_y) = (front(&bones[0]), front(&bones[1]));
     let upper = teeth(&bones[0], upper_y).into_iter().fold(f64::INFINITY, f64::min);
     let lower = teeth(&bones[1], lower_y).into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -412,32 +377,4 @@ fn beside(surface: &Surface, part: &Volume, reached: &[bool]) -> Surface {
         (0..8).any(|c| reached[grid.index([i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1)])])
     };
     compacted(surface, surface.triangles.iter().filter(near).copied().collect())
-}
-
-/// Places where the way from skin to bone is shorter than the lattice resolves, worst first.
-fn thin(skin: &Surface, to_bone: &Distance, edge: f64, within: &Cuboid, thickened: bool) -> Vec<Warning> {
-    let mut cells: std::collections::BTreeMap<[i64; 3], (f64, Vec3, f64)> = std::collections::BTreeMap::new();
-    for t in 0..skin.triangles.len() {
-        let corners = skin.corners(t);
-        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let thickness = to_bone.at(&middle);
-        if thickness >= THIN * edge || within.at(&middle) > 0.0 {
-            continue;
-        }
-        let key = [0, 1, 2].map(|a| (middle[a] / THIN_CELL).floor() as i64);
-        let cell = cells.entry(key).or_insert((f64::INFINITY, middle, 0.0));
-        cell.2 += super::doubled_area(corners).norm() / 2.0;
-        if thickness < cell.0 {
-            (cell.0, cell.1) = (thickness, middle);
-        }
-    }
-    let mut places: Vec<(f64, Vec3, f64)> = cells.into_values().collect();
-    places.sort_by(|p, q| p.0.total_cmp(&q.0));
-    let rest = places.split_off(places.len().min(THIN_TOLD));
-    let tell = |(thickness, place, area): (f64, Vec3, f64)| Warning::Thin { place, thickness: thickness.max(0.0), area, thickened };
-    let mut warnings: Vec<Warning> = places.into_iter().map(tell).collect();
-    if !rest.is_empty() {
-        warnings.push(Warning::MoreThin { places: rest.len(), area: rest.iter().map(|p| p.2).sum() });
-    }
-    warnings
 }

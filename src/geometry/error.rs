@@ -44,7 +44,9 @@ pub enum MeshingError {
         edge: f64,
     },
     /// A threshold that the volume never passes.
-    #[error("no {name} surface at {iso} HU: the samples range from {least} to {most}; check that the file is a CT in Hounsfield units (air -1000, water 0: an offset of 1024 is common) and the threshold")]
+    #[error(
+        "no {name} surface at {iso} HU: the samples range from {least} to {most}; check that the file is a CT in Hounsfield units (air -1000, water 0: an offset of 1024 is common) and the threshold"
+    )]
     EmptyIsosurface {
         /// "skin" or "bone".
         name: &'static str,
@@ -56,12 +58,32 @@ pub enum MeshingError {
         most: f64,
     },
     /// A region of interest that does not meet the volume.
-    #[error("the region of interest {region:.3?} m does not overlap the volume {volume:.3?} m by two lattice edges; give it in LPS coordinates of the scan")]
+    #[error(
+        "the region of interest {region:.3?} m does not overlap the volume {volume:.3?} m by two lattice edges; give it in LPS coordinates of the scan"
+    )]
     Region {
         /// Corners asked for, LPS, m.
         region: [[f64; 3]; 2],
         /// Corners of the volume, LPS, m.
         volume: [[f64; 3]; 2],
+    },
+    /// Thresholds the wrong way round.
+    #[error("the skin threshold ({skin} HU) must lie below the bone threshold ({bone} HU); -300 and 250 are usual")]
+    Thresholds {
+        /// Skin threshold, HU.
+        skin: f64,
+        /// Bone threshold, HU.
+        bone: f64,
+    },
+    /// Labels of another place.
+    #[error(
+        "the labels {labels:.3?} m do not cover the region to mesh {region:.3?} m (LPS); give the labels of this scan"
+    )]
+    Labels {
+        /// Corners of the region, LPS, m.
+        region: [[f64; 3]; 2],
+        /// Corners of the labels, LPS, m.
+        labels: [[f64; 3]; 2],
     },
     /// The finished mesh broke a rule every mesh keeps.
     #[error(transparent)]

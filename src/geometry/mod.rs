@@ -27,9 +27,10 @@ mod surface;
 mod tetrahedralise;
 mod topology;
 mod volume;
+mod warning;
 
 pub use assemble::{CUT, FREE};
-pub use bake::{BakeOptions, Baked, Warning, bake};
+pub use bake::{BakeOptions, Baked, bake};
 pub use block::{Block, Pattern, block};
 pub use distance::{Distance, Isosurface, unsigned};
 pub use error::MeshingError;
@@ -47,3 +48,4 @@ pub use stuffing::{NO_WALL, Side, Wall};
 pub use surface::{Surface, doubled_area, nearest_on_triangle};
 pub use tetrahedralise::{Stuffing, stuff, tetrahedralise};
 pub use volume::{Grid, Labels, Volume};
+pub use warning::Warning;

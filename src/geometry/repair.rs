@@ -126,11 +126,7 @@ fn drop_smaller_fans(mesh: &mut Stuffed, edges: &[[u32; 2]], adjacent: &[[u32; 4
 pub(super) fn compact(mesh: &mut Stuffed) -> Vec<u32> {
     let mut new = vec![u32::MAX; mesh.nodes.len()];
     mesh.tets.as_flattened().iter().for_each(|&a| new[a as usize] = 0);
-    let mut next = 0;
-    for n in new.iter_mut().filter(|n| **n == 0) {
-        *n = next;
-        next += 1;
-    }
+    (0u32..).zip(new.iter_mut().filter(|n| **n == 0)).for_each(|(next, n)| *n = next);
     let mut used = new.iter().map(|&n| n != u32::MAX);
     mesh.nodes.retain(|_| used.next() == Some(true));
     let mut used = new.iter().map(|&n| n != u32::MAX);

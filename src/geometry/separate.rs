@@ -56,7 +56,11 @@ pub(super) fn bone_map(volume: &Volume, bone: f64, labels: Option<&Labels>, nose
     };
     grow_back(volume, bone, &mut map);
     // Bone that no part reached belongs to the skull: loose teeth, cartilage, streaks.
-    (0..map.len()).filter(|&at| is_bone(at) && map[at] == 0).collect::<Vec<_>>().into_iter().for_each(|at| map[at] = SKULL);
+    (0..map.len())
+        .filter(|&at| is_bone(at) && map[at] == 0)
+        .collect::<Vec<_>>()
+        .into_iter()
+        .for_each(|at| map[at] = SKULL);
     (map, told)
 }
 
@@ -66,9 +70,7 @@ fn dense_parts(volume: &Volume, nose: &Vec3, position: &dyn Fn(usize) -> Vec3) -
     let voxel = grid.spacing.product();
     for dense in DENSE {
         let (number, sizes) = components(grid, |at| f64::from(volume.samples[at]) >= dense);
-        let in_chin = |p: &Vec3| {
-            (p.x - nose.x).abs() < MEDIAN && (nose.z + CHIN[0]..nose.z + CHIN[1]).contains(&p.z)
-        };
+        let in_chin = |p: &Vec3| (p.x - nose.x).abs() < MEDIAN && (nose.z + CHIN[0]..nose.z + CHIN[1]).contains(&p.z);
         let big = |at: usize| number[at] != 0 && sizes[number[at] as usize - 1] as f64 * voxel > MANDIBLE_VOLUME[0];
         let front = (0..grid.len())
             .filter(|&at| big(at))

@@ -176,7 +176,7 @@ impl<'a> Cursor<'a> {
 
     /// Everything left, in rows of `N` bytes.
     fn rows<const N: usize>(&mut self, tag: &str) -> Result<&'a [u8], IoError> {
-        if self.bytes.len() % N != 0 {
+        if !self.bytes.len().is_multiple_of(N) {
             let found = format!("{} bytes", self.bytes.len());
             return Err(IoError::format(self.path, format!("section {tag}"), found, &format!("rows of {N} bytes")));
         }

@@ -63,11 +63,7 @@ fn drop_unused(mesh: &mut TetMesh) {
     if !new.contains(&u32::MAX) {
         return;
     }
-    let mut next = 0;
-    for n in new.iter_mut().filter(|n| **n == 0) {
-        *n = next;
-        next += 1;
-    }
+    (0u32..).zip(new.iter_mut().filter(|n| **n == 0)).for_each(|(next, n)| *n = next);
     let at = |a: u32| new.get(a as usize).copied().unwrap_or(u32::MAX);
     let mut keep = new.iter().map(|&n| n != u32::MAX);
     mesh.nodes.retain(|_| keep.next() == Some(true));

@@ -151,7 +151,7 @@ fn regions(mesh: &mut TetMesh, cell: &[Array], field: &[Array], cells: &[usize],
     };
     let ids: Option<Vec<i64>> = cells.iter().map(|&c| ids.get(c).copied()).collect();
     let ids = ids.ok_or_else(|| IoError::format(path, "cell data `region`", "too few values", "one a cell"))?;
-    if let Some(Values::Text(names)) = named(field, REGION_NAMES).map(|a| a.values)
+    if let Some(Values::Text(names)) = named(field, REGION_NAMES).map(|a| text(&a.values))
         && ids.iter().all(|&r| r >= 0 && (r as usize) < names.len())
     {
         mesh.region = ids.iter().map(|&r| r as u32).collect();
@@ -164,4 +164,15 @@ fn regions(mesh: &mut TetMesh, cell: &[Array], field: &[Array], cells: &[usize],
     mesh.region_names = distinct.iter().map(|r| format!("region_{r}")).collect();
     mesh.region = ids.iter().map(|r| distinct.partition_point(|d| d < r) as u32).collect();
     Ok(())
+}
+
+/// Zero-terminated character codes as strings.
+pub(super) fn text(codes: &Values) -> Values {
+    let Values::I64(codes) = codes else { return codes.clone() };
+    let bytes: Vec<u8> = codes.iter().map(|&c| c as u8).collect();
+    if bytes.is_empty() {
+        return Values::Text(Vec::new());
+    }
+    let bytes = bytes.strip_suffix(&[0]).unwrap_or(&bytes);
+    Values::Text(bytes.split(|&b| b == 0).map(|w| String::from_utf8_lossy(w).into_owned()).collect())
 }

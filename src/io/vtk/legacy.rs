@@ -39,9 +39,15 @@ fn put_field(out: &mut String, arrays: &[Array]) {
     for array in arrays {
         let (kind, words): (&str, Vec<String>) = match &array.values {
             Values::F64(v) => ("double", v.iter().map(|&x| exact(x)).collect()),
-            Values::I64(v) => ("vtktypeint64", v.iter().map(i64::to_string).collect()),
+            Values::I64(v) => (
+                if v.iter().all(|&x| i32::try_from(x).is_ok()) { "int" } else { "vtktypeint64" },
+                v.iter().map(i64::to_string).collect(),
+            ),
             Values::I8(v) => ("char", v.iter().map(i8::to_string).collect()),
-            Values::Text(v) => ("string", v.iter().map(|w| percent(w)).collect()),
+            // Character codes, as in .vtu: readers that know numbers only pass over them.
+            Values::Text(v) => {
+                ("unsigned_char", v.iter().flat_map(|w| w.bytes().chain([0])).map(|c| c.to_string()).collect())
+            }
         };
         let rows = words.len() / array.components.max(1);
         *out += &format!("{} {} {rows} {kind}\n", percent(&array.name), array.components);

@@ -8,7 +8,7 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::base64;
-use super::grid::{Array, Grid, Values};
+use super::grid::{Array, Grid, Values, text};
 use crate::io::IoError;
 use crate::math::Vec3;
 use crate::mesh::TetMesh;
@@ -286,15 +286,4 @@ impl VtuFile<'_> {
             }
         })
     }
-}
-
-/// Zero-terminated character codes as strings.
-fn text(codes: &Values) -> Values {
-    let Values::I64(codes) = codes else { return codes.clone() };
-    let bytes: Vec<u8> = codes.iter().map(|&c| c as u8).collect();
-    let bytes = bytes.strip_suffix(&[0]).unwrap_or(&bytes);
-    if bytes.is_empty() && codes.is_empty() {
-        return Values::Text(Vec::new());
-    }
-    Values::Text(bytes.split(|&b| b == 0).map(|w| String::from_utf8_lossy(w).into_owned()).collect())
 }

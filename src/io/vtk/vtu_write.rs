@@ -63,16 +63,8 @@ impl Appender {
             Values::I8(v) => {
                 (if array.name == "types" { "UInt8" } else { "Int8" }, v.iter().map(|&x| x as u8).collect())
             }
-            Values::Text(words) => {
-                self.head += &format!(
-                    "<Array type=\"String\" Name=\"{name}\" NumberOfTuples=\"{}\" format=\"ascii\">\n",
-                    words.len()
-                );
-                let codes = words.iter().flat_map(|w| w.bytes().chain([0]));
-                self.head += &codes.map(|c| c.to_string()).collect::<Vec<_>>().join(" ");
-                self.head += "\n</Array>\n";
-                return;
-            }
+            // Character codes, not VTK's string arrays: those stop readers that know numbers only.
+            Values::Text(words) => ("UInt8", words.iter().flat_map(|w| w.bytes().chain([0])).collect()),
         };
         let count = match &array.values {
             Values::F64(v) => v.len(),

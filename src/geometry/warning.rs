@@ -1,0 +1,142 @@
+//! What to beware of in a baked mesh: thin tissue by place, a jaw that hangs on, pieces left out.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use super::label::LayerShare;
+use super::{Cuboid, Distance, Field, Nearest, Surface, doubled_area};
+use crate::math::Vec3;
+
+/// Tissue thinner than this many lattice edges is warned of.
+const THIN: f64 = 2.0;
+/// Thin places are gathered over cells of this size, m; the worst ones are told.
+const THIN_CELL: f64 = 0.02;
+const THIN_TOLD: usize = 12;
+
+/// Something the user should know about a mesh that was made.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Warning {
+    /// Tissue thinner than the lattice resolves: missing, or thickened into the bone.
+    Thin {
+        /// Thinnest place, LPS, m.
+        place: Vec3,
+        /// Thickness there, m.
+        thickness: f64,
+        /// Skin area about it that is thinner than twice the edge, m2.
+        area: f64,
+        /// Whether the mesh was thickened there.
+        thickened: bool,
+    },
+    /// More thin places than were told one by one.
+    MoreThin {
+        /// How many.
+        places: usize,
+        /// Their skin area, m2.
+        area: f64,
+    },
+    /// Skull and mandible hang together: the jaw cannot move.
+    JawNotFound,
+    /// No slit was cut.
+    NoSlit,
+    /// Loose pieces that were left out.
+    Dropped {
+        /// How many.
+        pieces: usize,
+        /// Their volume, m3.
+        volume: f64,
+    },
+    /// A layer that the mesh is too coarse for.
+    Layer(LayerShare),
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Thin { place, thickness, area, thickened } => {
+                let p = place * 1e3;
+                let (t, a) = (thickness * 1e3, area * 1e4);
+                let fate = if *thickened { "the mesh is thicker there than the tissue" } else { "it may be missing" };
+                write!(
+                    f,
+                    "thin tissue: {t:.1} mm at ({:.1}, {:.1}, {:.1}) mm LPS, {a:.1} cm2 about it; {fate}: choose a shorter edge",
+                    p.x, p.y, p.z
+                )
+            }
+            Self::MoreThin { places, area } => write!(f, "thin tissue at {places} more places, {:.1} cm2", area * 1e4),
+            Self::JawNotFound => {
+                write!(f, "skull and mandible could not be told apart: all bone is `skull`; give a labels file")
+            }
+            Self::NoSlit => write!(
+                f,
+                "no oral slit was cut: no faces between the jaws in the mouth's box; give the box of the mouth"
+            ),
+            Self::Dropped { pieces, volume } => write!(f, "{pieces} loose piece(s) of {:.2} mL left out", volume * 1e6),
+            Self::Layer(s) => write!(
+                f,
+                "layer `{}` takes {:.1} % of the volume, by depth it should take {:.1} %: choose a shorter edge",
+                s.name,
+                s.reached * 100.0,
+                s.wanted * 100.0
+            ),
+        }
+    }
+}
+
+/// What the thickness of tissue under the outer skin is measured to.
+pub(super) struct Under<'a> {
+    pub to_bone: &'a Distance,
+    /// Skin that faces inner air, and a finder of its nearest triangle.
+    pub inner: &'a Surface,
+    pub bins: Nearest<'a>,
+}
+
+impl Under<'_> {
+    /// Thickness under the middle of a skin triangle, and whether bone bounds it; infinite beyond `reach`.
+    fn thickness(&self, corners: [Vec3; 3], reach: f64) -> (f64, bool) {
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let bone = self.to_bone.at(&middle).max(0.0);
+        let air = self.bins.distance(&middle, reach).filter(|(_, t)| {
+            // Opposite walls of a sheet, not the rim where outer and inner skin meet.
+            let (a, b) = (doubled_area(corners), doubled_area(self.inner.corners(*t)));
+            a.dot(&b) < -0.5 * a.norm() * b.norm()
+        });
+        match air {
+            Some((air, _)) if air < bone => (air, false),
+            _ => (bone, true),
+        }
+    }
+}
+
+/// Places where tissue is thinner than the lattice resolves, worst first.
+pub(super) fn thin(skin: &Surface, under: &Under, edge: f64, thicken: bool, within: &Cuboid) -> Vec<Warning> {
+    let limit = THIN * edge;
+    let mut cells: BTreeMap<[i64; 3], Warning> = BTreeMap::new();
+    for t in 0..skin.triangles.len() {
+        let corners = skin.corners(t);
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        if within.at(&middle) > 0.0 {
+            continue;
+        }
+        let (found, on_bone) = under.thickness(corners, limit);
+        if found >= limit {
+            continue;
+        }
+        let key = [0, 1, 2].map(|a| (middle[a] / THIN_CELL).floor() as i64);
+        let fresh = Warning::Thin { place: middle, thickness: f64::INFINITY, area: 0.0, thickened: false };
+        if let Warning::Thin { place, thickness, area, thickened } = cells.entry(key).or_insert(fresh) {
+            *area += doubled_area(corners).norm() / 2.0;
+            if found < *thickness {
+                (*place, *thickness, *thickened) = (middle, found, on_bone && thicken);
+            }
+        }
+    }
+    let size =
+        |w: &Warning| if let Warning::Thin { thickness, area, .. } = w { (*thickness, *area) } else { (0.0, 0.0) };
+    let mut warnings: Vec<Warning> = cells.into_values().collect();
+    warnings.sort_by(|p, q| size(p).0.total_cmp(&size(q).0));
+    let rest = warnings.split_off(warnings.len().min(THIN_TOLD));
+    if !rest.is_empty() {
+        warnings.push(Warning::MoreThin { places: rest.len(), area: rest.iter().map(|w| size(w).1).sum() });
+    }
+    warnings
+}
