@@ -46,6 +46,7 @@ pub(super) struct Instance {
     stop: Option<f64>,
     pub(super) logger: Logger,
     /// Saved states; the host holds their addresses and can name no other.
+    #[expect(clippy::vec_box, reason = "addresses must not move when the list grows")]
     states: Vec<Box<Snapshot>>,
     poisoned: Option<String>,
 }
@@ -165,8 +166,8 @@ impl Instance {
         }
         let t = self.sim.time();
         let rounding = TIME_ROUNDING * t.abs().max(dt);
-        // Written so that a NaN is refused as well.
-        if !((at - t).abs() <= rounding) {
+        let apart = (at - t).abs();
+        if apart.is_nan() || apart > rounding {
             return Err(error(format!("current communication point {at} is not where the instance stands, {t}")));
         }
         if let Some(stop) = self.stop.filter(|&stop| t + dt > stop + TIME_ROUNDING * stop.abs().max(dt)) {
@@ -321,10 +322,9 @@ impl Instance {
     }
 
     fn find(&self, state: *const Snapshot) -> Result<usize, Refusal> {
-        let known = |kept: &Box<Snapshot>| std::ptr::eq::<Snapshot>(&raw const **kept, state);
         self.states
             .iter()
-            .position(known)
+            .position(|kept| std::ptr::eq::<Snapshot>(&raw const **kept, state))
             .ok_or_else(|| error("the FMU state is none of this instance (a new one starts from NULL)"))
     }
 
