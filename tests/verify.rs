@@ -21,3 +21,5 @@ mod rigid;
 mod scenes;
 #[path = "verify/time.rs"]
 mod time;
+#[path = "verify/viscous.rs"]
+mod viscous;

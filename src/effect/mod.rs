@@ -7,12 +7,14 @@ mod inertia;
 mod load;
 mod pressure;
 mod tissue;
+mod viscous;
 
 pub use gravity::Gravity;
 pub use inertia::{Inertia, lumped_masses};
 pub use load::DeadLoad;
 pub use pressure::Pressure;
-pub use tissue::{Elements, LAWS, Law, law};
+pub use tissue::{Branches, Elements, LAWS, Law, law};
+pub use viscous::{Measure, Viscous};
 
 use crate::math::Vec3;
 

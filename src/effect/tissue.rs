@@ -1,5 +1,6 @@
 //! Elastic tissue: tetrahedra of one material; the catalogue of laws.
 
+use super::viscous::{Measure, Viscous};
 use crate::energy::{
     Corotational, Energy, Fung, Isochoric, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, Principal, StVenantKirchhoff,
     StableNeoHookean, Stretches, VerondaWestmann, WithBulk, Yeoh,
@@ -45,6 +46,43 @@ pub struct Law {
     pub moduli: fn(&[Vec<f64>]) -> Lame,
     /// The tissue as a term.
     pub term: fn(&[Vec<f64>], Elements) -> Box<dyn Term>,
+    /// Its viscous overstress as a term.
+    pub viscous: fn(&[Vec<f64>], Branches, Elements) -> Box<dyn Term>,
+}
+
+/// A Prony series and where its memory begins.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Branches {
+    /// Pairs (g_i, tau_i in s).
+    pub series: Vec<(f64, f64)>,
+    /// First of its remembered values.
+    pub first: usize,
+}
+
+impl Branches {
+    /// Values it remembers on these elements.
+    pub fn memory(&self, elements: &Elements) -> usize {
+        elements.n_points() * Viscous::<Linear>::len_at_point(self.series.len())
+    }
+
+    fn over<M: Energy + 'static>(self, iso: M, measure: Measure, elements: Elements) -> Box<dyn Term> {
+        elements.of(Viscous { iso, branches: self.series, measure, first: self.first })
+    }
+}
+
+/// The volume-free neo-Hookean law that has the shear modulus of a law in E and nu.
+fn viscous_neo_hookean(c: &[Vec<f64>], b: Branches, t: Elements) -> Box<dyn Term> {
+    let iso = WithBulk { law: MooneyRivlin { c10: 0.5 * lame(c).mu, c01: 0.0 }, kappa: 0.0 };
+    b.over(iso, Measure::Finite, t)
+}
+
+fn viscous_linear(c: &[Vec<f64>], b: Branches, t: Elements) -> Box<dyn Term> {
+    let mu = lame(c).mu;
+    b.over(Linear(Lame { mu, lambda: -2.0 / 3.0 * mu }), Measure::Small, t)
+}
+
+fn viscous<L: Isochoric + 'static>(law: L, b: Branches, t: Elements) -> Box<dyn Term> {
+    b.over(WithBulk { law, kappa: 0.0 }, Measure::Finite, t)
 }
 
 fn term<M: Energy + 'static>(law: M, elements: Elements) -> Box<dyn Term> {
@@ -69,44 +107,68 @@ fn ogden(c: &[Vec<f64>]) -> Ogden {
     Ogden { terms: c[0].iter().copied().zip(c[1].iter().copied()).collect(), kappa: c[2][0] }
 }
 
-const E_NU: &[&str] = &["E", "nu"];
+fn mooney_rivlin(c: &[Vec<f64>]) -> MooneyRivlin {
+    MooneyRivlin { c10: c[0][0], c01: c[1][0] }
+}
+
+fn yeoh(c: &[Vec<f64>]) -> Yeoh {
+    Yeoh { c10: c[0][0], c20: c[1][0], c30: c[2][0] }
+}
+
+fn fung(c: &[Vec<f64>]) -> Fung {
+    Fung { mu: c[0][0], b: c[1][0] }
+}
+
+fn veronda_westmann(c: &[Vec<f64>]) -> VerondaWestmann {
+    VerondaWestmann { c1: c[0][0], c2: c[1][0] }
+}
+
+/// A law in Young's modulus and Poisson's ratio.
+const fn in_e_nu(name: &'static str, term: fn(&[Vec<f64>], Elements) -> Box<dyn Term>) -> Law {
+    Law { name, keys: &["E", "nu"], moduli: lame, term, viscous: viscous_neo_hookean }
+}
 
 /// The elastic laws by name: the one list.
 pub const LAWS: &[Law] = &[
-    Law { name: Linear::NAME, keys: E_NU, moduli: lame, term: |c, t| term(Linear(lame(c)), t) },
-    Law { name: Corotational::NAME, keys: E_NU, moduli: lame, term: |c, t| term(Corotational(lame(c)), t) },
-    Law { name: StVenantKirchhoff::NAME, keys: E_NU, moduli: lame, term: |c, t| term(StVenantKirchhoff(lame(c)), t) },
-    Law { name: StableNeoHookean::NAME, keys: E_NU, moduli: lame, term: |c, t| term(StableNeoHookean(lame(c)), t) },
-    Law { name: NeoHookean::NAME, keys: E_NU, moduli: lame, term: |c, t| term(NeoHookean(lame(c)), t) },
+    Law { viscous: viscous_linear, ..in_e_nu(Linear::NAME, |c, t| term(Linear(lame(c)), t)) },
+    in_e_nu(Corotational::NAME, |c, t| term(Corotational(lame(c)), t)),
+    in_e_nu(StVenantKirchhoff::NAME, |c, t| term(StVenantKirchhoff(lame(c)), t)),
+    in_e_nu(StableNeoHookean::NAME, |c, t| term(StableNeoHookean(lame(c)), t)),
+    in_e_nu(NeoHookean::NAME, |c, t| term(NeoHookean(lame(c)), t)),
     Law {
         name: MooneyRivlin::NAME,
         keys: &["c10", "c01", "kappa"],
         moduli: |c| with_bulk(2.0 * (c[0][0] + c[1][0]), c),
-        term: |c, t| bulk(MooneyRivlin { c10: c[0][0], c01: c[1][0] }, c, t),
+        term: |c, t| bulk(mooney_rivlin(c), c, t),
+        viscous: |c, b, t| viscous(mooney_rivlin(c), b, t),
     },
     Law {
         name: Yeoh::NAME,
         keys: &["c10", "c20", "c30", "kappa"],
         moduli: |c| with_bulk(2.0 * c[0][0], c),
-        term: |c, t| bulk(Yeoh { c10: c[0][0], c20: c[1][0], c30: c[2][0] }, c, t),
+        term: |c, t| bulk(yeoh(c), c, t),
+        viscous: |c, b, t| viscous(yeoh(c), b, t),
     },
     Law {
         name: Fung::NAME,
         keys: &["mu", "b", "kappa"],
         moduli: |c| with_bulk(c[0][0], c),
-        term: |c, t| bulk(Fung { mu: c[0][0], b: c[1][0] }, c, t),
+        term: |c, t| bulk(fung(c), c, t),
+        viscous: |c, b, t| viscous(fung(c), b, t),
     },
     Law {
         name: VerondaWestmann::NAME,
         keys: &["c1", "c2", "kappa"],
         moduli: |c| with_bulk(c[0][0] * c[1][0], c),
-        term: |c, t| bulk(VerondaWestmann { c1: c[0][0], c2: c[1][0] }, c, t),
+        term: |c, t| bulk(veronda_westmann(c), c, t),
+        viscous: |c, b, t| viscous(veronda_westmann(c), b, t),
     },
     Law {
         name: <Ogden as Principal>::NAME,
         keys: &["mu", "alpha", "kappa"],
         moduli: |c| with_bulk(c[0].iter().sum(), c),
         term: |c, t| term(Stretches(ogden(c)), t),
+        viscous: |c, b, t| b.over(Stretches(Ogden { kappa: 0.0, ..ogden(c) }), Measure::Finite, t),
     },
 ];
 

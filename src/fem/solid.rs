@@ -107,7 +107,8 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
         self.nodes[e]
     }
     fn energy(&self, at: &At, e: usize, x: &[Vec3; N]) -> f64 {
-        let psi = |(q, point): (usize, &Point<N>)| point.w * self.material.psi(at, Q * e + q, &deformation(&point.dN, x));
+        let psi =
+            |(q, point): (usize, &Point<N>)| point.w * self.material.psi(at, Q * e + q, &deformation(&point.dN, x));
         self.points[e].iter().enumerate().map(psi).sum()
     }
     fn gradient(&self, at: &At, e: usize, x: &[Vec3; N], g: &mut [Vec3; N]) -> f64 {

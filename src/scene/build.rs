@@ -2,11 +2,11 @@
 
 use super::SceneError;
 use super::check::Text;
-use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile, TissueSpec};
+use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile, TissueSpec, ViscousSpec};
 use super::keys::find;
 use super::place::{area_shares, nearest_point, patch, volume_shares};
 use super::programme::{Programme, Track};
-use crate::effect::{self, DeadLoad, Elements, Gravity, Inertia, Law, Pressure, lumped_masses};
+use crate::effect::{self, Branches, DeadLoad, Elements, Gravity, Inertia, Law, Pressure, lumped_masses};
 use crate::energy::Lame;
 use crate::fem::{Term, add_midsides};
 use crate::math::Vec3;
@@ -28,6 +28,14 @@ const REFRESH_AFTER: u32 = 20;
 /// [`SceneError`] with line and column.
 pub fn build(text: &str, file: &SceneFile, mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
     Builder { text: Text(text) }.build(file, mesh)
+}
+
+/// What the materials of a scene come to.
+struct Tissue {
+    terms: Vec<Box<dyn Term>>,
+    /// By region, kg/m3.
+    density: Vec<f64>,
+    n_history: usize,
 }
 
 struct Builder<'a> {
@@ -62,7 +70,7 @@ impl Builder<'_> {
                 return Err(self.text.at(at, format!("`order` of [mesh] is {found}; wanted 1 or 2")));
             }
         };
-        let (mut terms, density) = self.tissue(file, &mesh, &midsides, &mut warnings)?;
+        let Tissue { mut terms, density, n_history } = self.tissue(file, &mesh, &midsides, &mut warnings)?;
         let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
         let mut bones = self.bones(bone, &mesh, rings)?;
         if rings > 0 {
@@ -135,7 +143,7 @@ impl Builder<'_> {
             pressures,
             markers,
             terms,
-            n_history: 0,
+            n_history,
             inertia,
             layout,
             start,
@@ -151,14 +159,14 @@ impl Builder<'_> {
         Ok((model, Programme { dt: dt.unwrap_or(0.1), end: end.unwrap_or(1.0), tracks }))
     }
 
-    /// One term for each material, and the density of each region.
+    /// One term for each material, its overstress if it has one, and the density of each region.
     fn tissue(
         &self,
         file: &SceneFile,
         mesh: &TetMesh,
         midsides: &[[u32; 6]],
         warnings: &mut Vec<String>,
-    ) -> Result<(Vec<Box<dyn Term>>, Vec<f64>), SceneError> {
+    ) -> Result<Tissue, SceneError> {
         let mut material = vec![usize::MAX; mesh.region_names.len()];
         for (k, spec) in file.tissue.iter().enumerate() {
             let Some(regions) = &spec.regions else {
@@ -181,7 +189,7 @@ impl Builder<'_> {
             );
             return Err(self.text.at(file.mesh.span().start, message));
         }
-        let mut terms = Vec::new();
+        let (mut terms, mut n_history) = (Vec::new(), 0);
         let mut density = vec![0.0; mesh.region_names.len()];
         for (k, spec) in file.tissue.iter().enumerate() {
             let (law, constants) = self.law(spec)?;
@@ -200,10 +208,32 @@ impl Builder<'_> {
             if !elements.is_empty() {
                 let tets: Vec<[u32; 4]> = elements.iter().map(|&e| mesh.tets[e]).collect();
                 let midsides: Vec<[u32; 6]> = elements.iter().filter_map(|&e| midsides.get(e).copied()).collect();
-                terms.push((law.term)(&constants, Elements { X: &mesh.nodes, tets: &tets, midsides: &midsides }));
+                let elements = Elements { X: &mesh.nodes, tets: &tets, midsides: &midsides };
+                terms.push((law.term)(&constants, elements));
+                if let Some(spec) = &spec.viscous {
+                    let branches = Branches { series: self.series(spec)?, first: n_history };
+                    n_history += branches.memory(&elements);
+                    terms.push((law.viscous)(&constants, branches, elements));
+                }
             }
         }
-        Ok((terms, density))
+        Ok(Tissue { terms, density, n_history })
+    }
+
+    /// Pairs (g, tau) of a Prony series.
+    fn series(&self, spec: &ViscousSpec) -> Result<Vec<(f64, f64)>, SceneError> {
+        for (key, list) in [("g", &spec.g), ("tau", &spec.tau)] {
+            if let Some(bad) = list.get_ref().iter().find(|v| !find("tissue.viscous", key).range.holds(**v)) {
+                return Err(self.text.out_of_range("tissue.viscous", key, list, bad));
+            }
+        }
+        let (g, tau) = (spec.g.get_ref(), spec.tau.get_ref());
+        if g.is_empty() || g.len() != tau.len() {
+            let message =
+                format!("a Prony series takes as many `g` as `tau`, at least one; found {} and {}", g.len(), tau.len());
+            return Err(self.text.at(spec.g.span().start, message));
+        }
+        Ok(g.iter().copied().zip(tau.iter().copied()).collect())
     }
 
     /// The law of a material and its constants, in the law's order.

@@ -78,12 +78,37 @@ pub struct TissueSpec {
     pub c30: Option<Spanned<Constant>>,
     pub kappa: Option<Spanned<Constant>>,
     pub density: Option<Spanned<f64>>,
+    pub viscous: Option<ViscousSpec>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ViscousSpec {
+    pub g: Spanned<Vec<f64>>,
+    pub tau: Spanned<Vec<f64>>,
 }
 
 impl TissueSpec {
     /// The constants that stand in the table, by key.
     pub fn constants(&self) -> [(&'static str, &Option<Spanned<Constant>>); 12] {
-        let Self { regions: _, energy: _, E, nu, mu, alpha, b, c1, c2, c10, c01, c20, c30, kappa, density: _ } = self;
+        let Self {
+            regions: _,
+            energy: _,
+            E,
+            nu,
+            mu,
+            alpha,
+            b,
+            c1,
+            c2,
+            c10,
+            c01,
+            c20,
+            c30,
+            kappa,
+            density: _,
+            viscous: _,
+        } = self;
         [
             ("E", E),
             ("nu", nu),

@@ -220,7 +220,8 @@ fn step_piece(
 ) -> Result<(), SolveError> {
     let parts = model.parts();
     let dofs = model.dofs();
-    let Workspace { minimiser, factored, config, before, v, history, remembered, inputs, x_tilde, pivots, u, wrenches } = work;
+    let Workspace { minimiser, factored, config, before, v, history, remembered, inputs, x_tilde, pivots, u, wrenches } =
+        work;
     for ((y, x), v) in x_tilde.iter_mut().zip(&config.x).zip(&*v) {
         *y = x + dt * v;
     }
