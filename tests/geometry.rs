@@ -7,5 +7,6 @@ mod geometry {
     mod head;
     mod marching_cubes;
     mod mesh_files;
+    mod noise;
     mod stuffing;
 }

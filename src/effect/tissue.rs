@@ -4,7 +4,7 @@ use crate::energy::{
     Corotational, Energy, Fung, Isochoric, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, Principal, StVenantKirchhoff,
     StableNeoHookean, Stretches, VerondaWestmann, WithBulk, Yeoh,
 };
-use crate::fem::{OnElements, Term, Tet4, Tet10};
+use crate::fem::{Elastic, Material, OnElements, Solid, Term, tet4_points, tet10_points};
 use crate::math::Vec3;
 
 /// The elements of a tissue.
@@ -16,6 +16,23 @@ pub struct Elements<'a> {
     pub tets: &'a [[u32; 4]],
     /// Mid-edge nodes of each tetrahedron; empty for linear elements.
     pub midsides: &'a [[u32; 6]],
+}
+
+impl Elements<'_> {
+    /// A term of these elements made of `material`.
+    pub fn of<M: Material + 'static>(&self, material: M) -> Box<dyn Term> {
+        let Elements { X, tets, midsides } = *self;
+        if midsides.is_empty() {
+            return Box::new(OnElements(Solid::new(material, X, tets.iter().copied(), tet4_points)));
+        }
+        let ten = |(t, m): (&[u32; 4], &[u32; 6])| std::array::from_fn(|k| if k < 4 { t[k] } else { m[k - 4] });
+        Box::new(OnElements(Solid::new(material, X, tets.iter().zip(midsides).map(ten), tet10_points)))
+    }
+
+    /// Points of integration of all elements.
+    pub fn n_points(&self) -> usize {
+        self.tets.len() * if self.midsides.is_empty() { 1 } else { 4 }
+    }
 }
 
 /// An elastic law that a scene can choose.
@@ -30,13 +47,8 @@ pub struct Law {
     pub term: fn(&[Vec<f64>], Elements) -> Box<dyn Term>,
 }
 
-fn term<M: Energy + 'static>(material: M, elements: Elements) -> Box<dyn Term> {
-    let Elements { X, tets, midsides } = elements;
-    if midsides.is_empty() {
-        return Box::new(OnElements(Tet4::new(material, X, tets.iter().copied())));
-    }
-    let ten = |(t, m): (&[u32; 4], &[u32; 6])| std::array::from_fn(|k| if k < 4 { t[k] } else { m[k - 4] });
-    Box::new(OnElements(Tet10::new(material, X, tets.iter().zip(midsides).map(ten))))
+fn term<M: Energy + 'static>(law: M, elements: Elements) -> Box<dyn Term> {
+    elements.of(Elastic(law))
 }
 
 fn lame(c: &[Vec<f64>]) -> Lame {

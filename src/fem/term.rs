@@ -13,6 +13,8 @@ pub struct At<'a> {
     pub inputs: &'a [f64],
     /// Where inertia alone would carry each node, m; empty in quasi-static scenes.
     pub x_tilde: &'a [Vec3],
+    /// What terms remember of the steps before; a term knows where its own lies.
+    pub history: &'a [f64],
     /// Positions at which follower loads take their direction, m.
     pub x_lag: &'a [Vec3],
 }
@@ -85,9 +87,17 @@ pub trait Term: Send + Sync {
     }
 
     /// Strain at `x`, for terms that have elements.
-    fn strain(&self, _x: &[Vec3]) -> Strain {
+    fn strain(&self, _at: &At, _x: &[Vec3]) -> Strain {
         Strain::NONE
     }
+
+    /// Whether it remembers something of accepted steps.
+    fn remembers(&self) -> bool {
+        false
+    }
+
+    /// Writes its part of `history` after a step to `x` was accepted; `at.history` is still the old one.
+    fn commit(&self, _at: &At, _x: &[Vec3], _history: &mut [f64]) {}
 }
 
 /// One element's share of a term: local nodes, 3x3 blocks, no global index.
@@ -103,15 +113,21 @@ pub trait Kernel<const N: usize>: Send + Sync {
     /// Corner nodes of element `e`.
     fn nodes(&self, e: usize) -> [u32; N];
     /// Energy of element `e`, J.
-    fn energy(&self, e: usize, x: &[Vec3; N]) -> f64;
+    fn energy(&self, at: &At, e: usize, x: &[Vec3; N]) -> f64;
     /// Energy (J) and gradient (N) of element `e`.
-    fn gradient(&self, e: usize, x: &[Vec3; N], g: &mut [Vec3; N]) -> f64;
+    fn gradient(&self, at: &At, e: usize, x: &[Vec3; N], g: &mut [Vec3; N]) -> f64;
     /// Upper triangle of Hessian blocks of element `e`, row by row, N/m.
-    fn hessian(&self, e: usize, x: &[Vec3; N], curvature: Curvature, upper: &mut [Mat3]);
+    fn hessian(&self, at: &At, e: usize, x: &[Vec3; N], curvature: Curvature, upper: &mut [Mat3]);
     /// Strain of element `e`.
-    fn strain(&self, e: usize, x: &[Vec3; N]) -> Strain;
+    fn strain(&self, at: &At, e: usize, x: &[Vec3; N]) -> Strain;
     /// Whether the energy is quadratic in the positions.
     fn is_quadratic(&self) -> bool;
+    /// Whether it remembers something of accepted steps.
+    fn remembers(&self) -> bool {
+        false
+    }
+    /// Writes what element `e` remembers into `history`.
+    fn commit(&self, _at: &At, _e: usize, _x: &[Vec3; N], _history: &mut [f64]) {}
 }
 
 /// Upper-triangle blocks of the largest element, the ten-node tetrahedron.
@@ -132,16 +148,16 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
         self.0.name()
     }
 
-    fn energy(&self, _at: &At, x: &[Vec3]) -> f64 {
-        (0..self.0.len()).map(|e| self.0.energy(e, &self.gather(e, x).1)).sum()
+    fn energy(&self, at: &At, x: &[Vec3]) -> f64 {
+        (0..self.0.len()).map(|e| self.0.energy(at, e, &self.gather(e, x).1)).sum()
     }
 
-    fn add_gradient(&self, _at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
+    fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
         let mut sum = 0.0;
         let mut local = [Vec3::zeros(); N];
         for e in 0..self.0.len() {
             let (nodes, x) = self.gather(e, x);
-            sum += self.0.gradient(e, &x, &mut local);
+            sum += self.0.gradient(at, e, &x, &mut local);
             for (a, g_a) in nodes.iter().zip(&local) {
                 g[*a as usize] += g_a;
             }
@@ -155,12 +171,12 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
         }
     }
 
-    fn add_hessian(&self, _at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
+    fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
         let mut upper = [Mat3::zeros(); MAX_BLOCKS];
         let upper = &mut upper[..N * (N + 1) / 2];
         for e in 0..self.0.len() {
             let (nodes, x) = self.gather(e, x);
-            self.0.hessian(e, &x, curvature, upper);
+            self.0.hessian(at, e, &x, curvature, upper);
             sink.add(&nodes, upper);
         }
     }
@@ -169,7 +185,17 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
         self.0.is_quadratic()
     }
 
-    fn strain(&self, x: &[Vec3]) -> Strain {
-        (0..self.0.len()).fold(Strain::NONE, |s, e| s.and(self.0.strain(e, &self.gather(e, x).1)))
+    fn strain(&self, at: &At, x: &[Vec3]) -> Strain {
+        (0..self.0.len()).fold(Strain::NONE, |s, e| s.and(self.0.strain(at, e, &self.gather(e, x).1)))
+    }
+
+    fn remembers(&self) -> bool {
+        self.0.remembers()
+    }
+
+    fn commit(&self, at: &At, x: &[Vec3], history: &mut [f64]) {
+        for e in 0..self.0.len() {
+            self.0.commit(at, e, &self.gather(e, x).1, history);
+        }
     }
 }

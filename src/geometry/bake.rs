@@ -84,6 +84,8 @@ pub struct Baked {
     pub warnings: Vec<Warning>,
     /// Share of the volume of each layer.
     pub layers: Vec<LayerShare>,
+    /// Tops of the right and the left condyle, LPS, m: the jaw opens about the line through them.
+    pub condyles: Option<[Vec3; 2]>,
     /// Nodes doubled along the oral slit.
     pub slit_nodes: usize,
     /// Bone nodes released because a second bone is near.
@@ -197,7 +199,8 @@ pub fn bake(
     let coarse = |s: &&LayerShare| (s.reached - s.wanted).abs() > 0.1 * s.wanted;
     warnings.extend(layers.iter().filter(coarse).cloned().map(Warning::Layer));
     progress("done", 1.0);
-    Ok(Baked { mesh, report, warnings, layers, slit_nodes, released_nodes })
+    let condyles = if told { condyles(&bone_surfaces[1], &nose) } else { None };
+    Ok(Baked { mesh, report, warnings, layers, condyles, slit_nodes, released_nodes })
 }
 
 fn empty(name: &'static str, iso: f64, volume: &Volume) -> MeshingError {
@@ -313,6 +316,18 @@ fn compacted(surface: &Surface, mut triangles: Vec<[u32; 3]>) -> Surface {
 fn skin_part(surface: &Surface, part: &Volume, outer: &[bool], wanted: bool) -> Surface {
     let is_outer = |t: &[u32; 3]| outer[part.grid.index(part.grid.nearest(&surface.vertices[t[0] as usize]))];
     compacted(surface, surface.triangles.iter().filter(|t| is_outer(t) == wanted).copied().collect())
+}
+
+/// The highest points of the mandible's back third on both sides of the nose's plane.
+fn condyles(mandible: &Surface, nose: &Vec3) -> Option<[Vec3; 2]> {
+    let y = mandible.vertices.iter().map(|p| p.y);
+    let (front, back) = (y.clone().fold(f64::INFINITY, f64::min), y.fold(f64::NEG_INFINITY, f64::max));
+    let behind = front + (back - front) * 2.0 / 3.0;
+    let top = |left: bool| {
+        let side = mandible.vertices.iter().filter(|p| (p.x > nose.x) == left && p.y > behind);
+        side.max_by(|p, q| p.z.total_cmp(&q.z)).copied()
+    };
+    Some([top(false)?, top(true)?])
 }
 
 /// The box of the mouth: given, or about the front teeth, where skull and mandible come nearest near the median plane.

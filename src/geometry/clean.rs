@@ -10,7 +10,7 @@ const AIR: f32 = -1000.0;
 const BONE_REACH: f64 = 3e-3;
 /// Passages narrower than twice this part inner from outer air, m: nostrils and the mouth.
 const AIR_REACH: f64 = 4e-3;
-/// How much further than the reach the regrown region is taken to touch the surface again.
+/// A region found beyond a reach is regrown by that reach and this many voxels, to touch the surface again.
 const REGROW: f64 = 1.5;
 
 /// The samples of a volume whose indices lie in `low..=high`.
@@ -144,7 +144,7 @@ pub(super) fn solid_bones(volume: &mut Volume, bone: f64, to_bone: &Distance) ->
     let (number, sizes) = components(grid, wide);
     let Some(largest) = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k)) else { return 0 };
     let open: Vec<bool> = number.iter().map(|&n| n as usize == largest + 1).collect();
-    let grown = grow(grid, &open, REGROW * BONE_REACH);
+    let grown = grow(grid, &open, BONE_REACH + REGROW * grid.spacing.mean());
     let closed: Vec<usize> = (0..grid.len()).filter(|&at| tissue(at) && !grown[at]).collect();
     let filled = closed.len();
     for at in closed {
@@ -164,5 +164,5 @@ pub(super) fn outer_air(volume: &Volume, skin: f64, to_skin: &Distance) -> Vec<b
     let step = grid.spacing.max();
     let seeds = (0..nx * ny * nz).filter(|&at| air(at) && y(at) < front + step);
     let reached = flood(grid, seeds, air);
-    grow(grid, &reached, REGROW * AIR_REACH)
+    grow(grid, &reached, AIR_REACH + REGROW * step)
 }

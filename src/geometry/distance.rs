@@ -11,8 +11,8 @@ use crate::math::Vec3;
 
 /// Exact distances reach this many voxels from each triangle's box.
 const BAND: f64 = 1.5;
-/// Sweeps in eight directions, this many times; twice suffices away from strong bends.
-const ROUNDS: usize = 2;
+/// Rounds of sweeps in eight directions for ways that wind round bones; straight ways need one.
+const WINDING_ROUNDS: usize = 4;
 
 /// A signed distance sampled on a grid, m; negative where the body is.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,6 +78,8 @@ pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
     let local: Vec<Vec3> = surface.vertices.iter().map(|v| grid.coordinates(v).component_mul(&grid.spacing)).collect();
     for t in &surface.triangles {
         let corners = t.map(|a| local[a as usize]);
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius = corners.iter().fold(0.0, |r: f64, c| r.max((c - centre).norm()));
         let low = corners[0].inf(&corners[1]).inf(&corners[2]) - reach;
         let high = corners[0].sup(&corners[1]).sup(&corners[2]) + reach;
         let bound = |x: f64, a: usize| (x / grid.spacing[a]).clamp(0.0, grid.dims[a] as f64 - 1.0);
@@ -87,19 +89,17 @@ pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
             for j in first[1]..=last[1] {
                 for i in first[0]..=last[0] {
                     let p = Vec3::new(i as f64, j as f64, k as f64).component_mul(&grid.spacing);
-                    let d = (nearest_on_triangle(&p, corners) - p).norm() as f32;
                     let value = &mut values[grid.index([i, j, k])];
-                    *value = value.min(d);
+                    // No point of the triangle is nearer than its bounding ball.
+                    if (p - centre).norm() - radius < f64::from(*value) {
+                        *value = value.min((nearest_on_triangle(&p, corners) - p).norm() as f32);
+                    }
                 }
             }
         }
     }
     let fixed: Vec<bool> = values.iter().map(|v| v.is_finite()).collect();
-    for _ in 0..ROUNDS {
-        for direction in 0..8 {
-            sweep(grid, &mut values, &fixed, direction);
-        }
-    }
+    (0..8).for_each(|direction| sweep(grid, &mut values, &fixed, direction));
     values
 }
 
@@ -109,7 +109,7 @@ pub(super) fn travel(grid: &Grid, sources: &[bool], blocked: &[bool]) -> Vec<f32
     let mut values: Vec<f32> = sources.iter().map(|&s| if s { 0.0 } else { f32::INFINITY }).collect();
     let fixed: Vec<bool> = sources.iter().zip(blocked).map(|(&s, &b)| s || b).collect();
     // Ways wind round bones: each bend may need another round.
-    for _ in 0..2 * ROUNDS {
+    for _ in 0..WINDING_ROUNDS {
         for direction in 0..8 {
             sweep(grid, &mut values, &fixed, direction);
         }

@@ -12,6 +12,8 @@ pub struct Nearest<'a> {
     dims: [usize; 3],
     begin: Vec<u32>,
     items: Vec<u32>,
+    /// Centre and radius of a ball about each triangle.
+    balls: Vec<(Vec3, f64)>,
 }
 
 impl<'a> Nearest<'a> {
@@ -20,8 +22,14 @@ impl<'a> Nearest<'a> {
         let far = Vec3::repeat(f64::INFINITY);
         let (low, high) = surface.vertices.iter().fold((far, -far), |(l, h), v| (l.inf(v), h.sup(v)));
         let dims = [0, 1, 2].map(|a| if high[a] >= low[a] { ((high[a] - low[a]) / cell) as usize + 1 } else { 1 });
-        let mut bins =
-            Self { surface, low, cell, dims, begin: vec![0; dims.iter().product::<usize>() + 1], items: Vec::new() };
+        let ball = |t: usize| {
+            let x = surface.corners(t);
+            let middle = (x[0] + x[1] + x[2]) / 3.0;
+            (middle, x.iter().fold(0.0, |r: f64, c| r.max((c - middle).norm())))
+        };
+        let balls = (0..surface.triangles.len()).map(ball).collect();
+        let begin = vec![0; dims.iter().product::<usize>() + 1];
+        let mut bins = Self { surface, low, cell, dims, begin, items: Vec::new(), balls };
         for fill in [false, true] {
             let mut place = bins.begin.clone();
             for t in 0..surface.triangles.len() {
@@ -70,6 +78,10 @@ impl<'a> Nearest<'a> {
                 break;
             }
             self.ring(centre, ring, |t| {
+                let (middle, radius) = self.balls[t];
+                if (p - middle).norm() - radius >= best.map_or(reach, |b| b.0) {
+                    return;
+                }
                 let d = (nearest_on_triangle(p, self.surface.corners(t)) - p).norm();
                 if d < best.map_or(reach, |b| b.0) {
                     best = Some((d, t));

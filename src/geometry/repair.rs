@@ -8,7 +8,7 @@ use crate::mesh::signed_volume;
 /// Rounds of repair; each leaves fewer pinches, and two are usual.
 const ROUNDS: usize = 20;
 /// A parted node moves this share of the way into its own piece, so that no two nodes share a place.
-const PART: f64 = 0.03;
+const PART: f64 = 0.01;
 
 /// What a repair changed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

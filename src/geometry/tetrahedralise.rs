@@ -5,8 +5,7 @@ use super::repair::{Repair, repair};
 use super::stencils::{Stuffed, stencils};
 use super::stuffing::{NO_WALL, Wall, Warped};
 use super::topology::{boundary, neighbours};
-use super::{MeshingError, Sizing};
-use crate::geometry::Cuboid;
+use super::{Cuboid, MeshingError, Sizing};
 use crate::math::Vec3;
 
 /// Tetrahedra between walls, with each boundary triangle's wall.

@@ -135,6 +135,7 @@ impl Builder<'_> {
             pressures,
             markers,
             terms,
+            n_history: 0,
             inertia,
             layout,
             start,

@@ -82,6 +82,8 @@ pub struct ModelParts {
     pub markers: Vec<Marker>,
     /// The summands of the energy.
     pub terms: Vec<Box<dyn Term>>,
+    /// Values that the terms remember from step to step.
+    pub n_history: usize,
     /// Dynamics, if the scene has it.
     pub inertia: Option<Inertia>,
     /// Where the inputs lie.

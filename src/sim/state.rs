@@ -16,6 +16,7 @@ pub(super) struct Linearisation {
     pub t: f64,
     pub dt: f64,
     pub inputs: Vec<f64>,
+    pub history: Vec<f64>,
 }
 
 /// What the last step left for the host to read.
@@ -39,6 +40,8 @@ pub struct State {
     pub(super) config: Configuration,
     /// Nodal velocities, m/s; empty in quasi-static scenes.
     pub(super) v: Vec<Vec3>,
+    /// What terms remember of the steps before (viscous overstress); empty in scenes without.
+    pub(super) history: Vec<f64>,
     /// Inputs as the host set them last.
     pub(super) inputs: Vec<f64>,
     /// Inputs of the last accepted step: where the next one starts from.
@@ -99,6 +102,7 @@ impl State {
             t: 0.0,
             config: Configuration { x: parts.mesh.nodes.clone(), poses: vec![Pose::REST; n] },
             v: if parts.inertia.is_some() { vec![Vec3::zeros(); parts.mesh.nodes.len()] } else { Vec::new() },
+            history: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
             applied: rest_inputs(model),
             linearisation: None,
@@ -122,6 +126,7 @@ impl State {
         self.config.x.len() == parts.mesh.nodes.len()
             && self.config.poses.len() == parts.bones.len()
             && self.inputs.len() == parts.layout.len()
+            && self.history.len() == parts.n_history
             && self.v.is_empty() == parts.inertia.is_none()
     }
 
@@ -132,6 +137,7 @@ impl State {
         body.f64(self.t);
         put_config(&mut body, &self.config);
         put_vectors(&mut body, &self.v);
+        body.f64s(self.history.iter().copied());
         body.f64s(self.inputs.iter().copied());
         body.f64s(self.applied.iter().copied());
         let o = &self.outputs;
@@ -146,6 +152,7 @@ impl State {
             body.f64(l.t);
             body.f64(l.dt);
             body.f64s(l.inputs.iter().copied());
+            body.f64s(l.history.iter().copied());
         }
         let mut out = Writer::default();
         out.raw(MAGIC);
@@ -185,6 +192,7 @@ impl State {
         let t = r.f64()?;
         let config = take_config(&mut r, n, n_bones)?;
         let v = take_vectors(&mut r, "velocities", if parts.inertia.is_some() { n } else { 0 })?;
+        let history = take_f64s(&mut r, "remembered values", parts.n_history)?;
         let inputs = take_f64s(&mut r, "inputs", n_inputs)?;
         let applied = take_f64s(&mut r, "inputs", n_inputs)?;
         let reaction_force = take_vectors(&mut r, "reactions", n_bones)?;
@@ -198,6 +206,7 @@ impl State {
                 t: r.f64()?,
                 dt: r.f64()?,
                 inputs: take_f64s(&mut r, "inputs", n_inputs)?,
+                history: take_f64s(&mut r, "remembered values", parts.n_history)?,
             })),
         };
         let [residual, elastic, kinetic, min_det_f, max_stretch] = scalars[..] else {
@@ -214,7 +223,7 @@ impl State {
             min_det_f,
             max_stretch,
         };
-        Ok(State { t, config, v, inputs, applied, linearisation, outputs })
+        Ok(State { t, config, v, history, inputs, applied, linearisation, outputs })
     }
 }
 

@@ -62,6 +62,9 @@ pub(super) struct Workspace {
     /// Where the piece at hand started from.
     before: Configuration,
     v: Vec<Vec3>,
+    /// What terms remember, and where the next memory is written.
+    history: Vec<f64>,
+    remembered: Vec<f64>,
     inputs: Vec<f64>,
     x_tilde: Vec<Vec3>,
     pivots: Vec<Vec3>,
@@ -81,7 +84,7 @@ impl Workspace {
             X,
             pivots: &pivots,
             wrenches: &wrenches,
-            at: At { t: 0.0, dt: 0.0, inputs: &parts.start, x_tilde: X, x_lag: X },
+            at: At { t: 0.0, dt: 0.0, inputs: &parts.start, history: &[], x_tilde: X, x_lag: X },
         };
         Workspace {
             minimiser: Minimiser::new(&problem, parts.strategy),
@@ -89,6 +92,8 @@ impl Workspace {
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             before: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             v: vec![Vec3::zeros(); if parts.inertia.is_some() { X.len() } else { 0 }],
+            history: vec![0.0; parts.n_history],
+            remembered: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
             x_tilde: if parts.inertia.is_some() { X.clone() } else { Vec::new() },
             u: vec![Vec3::zeros(); model.dofs().prescribed.len()],
@@ -129,6 +134,7 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     read_pivots(model, &state.inputs, &mut work.pivots);
     work.config.copy_from(&state.config);
     work.v.copy_from_slice(&state.v);
+    work.history.copy_from_slice(&state.history);
     let mut report = StepReport::new(0);
     let mut linearisation = state.linearisation.clone();
     let (mut done, mut piece) = (0.0, 1.0);
@@ -158,7 +164,8 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
             }
         }
     }
-    let strain = strain_of(model, &work.config.x);
+    let at = At { t: state.t + dt, dt, inputs: &work.inputs, history: &work.history, x_tilde: &[], x_lag: &[] };
+    let strain = strain_of(model, &at, &work.config.x);
     if strain.min_det_f <= 0.0 && state.outputs.min_det_f > 0.0 {
         report.warnings.push(format!("elements are turned inside out (smallest det F {:.3})", strain.min_det_f));
     }
@@ -166,6 +173,7 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     state.t += dt;
     state.config.copy_from(&work.config);
     state.v.copy_from_slice(&work.v);
+    state.history.copy_from_slice(&work.history);
     state.applied.copy_from_slice(&work.inputs);
     state.linearisation = linearisation;
     report.min_det_f = strain.min_det_f;
@@ -212,13 +220,13 @@ fn step_piece(
 ) -> Result<(), SolveError> {
     let parts = model.parts();
     let dofs = model.dofs();
-    let Workspace { minimiser, factored, config, before, v, inputs, x_tilde, pivots, u, wrenches } = work;
+    let Workspace { minimiser, factored, config, before, v, history, remembered, inputs, x_tilde, pivots, u, wrenches } = work;
     for ((y, x), v) in x_tilde.iter_mut().zip(&config.x).zip(&*v) {
         *y = x + dt * v;
     }
-    let at = At { t, dt, inputs, x_tilde, x_lag: &[] };
+    let at = At { t, dt, inputs, history, x_tilde, x_lag: &[] };
     let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
-    let inverted_before = strain_of(model, &config.x).min_det_f <= 0.0;
+    let inverted_before = strain_of(model, &at, &config.x).min_det_f <= 0.0;
 
     restore_factor(model, &problem, minimiser, factored, linearisation, config, report)?;
     place_bones(model, inputs, config);
@@ -233,15 +241,26 @@ fn step_piece(
     report.iterations += 1;
     let outcome = minimiser.minimise(&problem, config)?;
     report.count(&outcome);
-    let inverts = || !problem.is_quadratic() && !inverted_before && strain_of(model, &config.x).min_det_f <= 0.0;
+    let inverts = || !problem.is_quadratic() && !inverted_before && strain_of(model, &at, &config.x).min_det_f <= 0.0;
     if piece > SMALLEST_TO_AVOID_INVERSION && inverts() {
         return Err(SolveError::Inverts);
     }
     if outcome.factorisations > 0 {
-        let made = Linearisation { config: minimiser.factored_at().clone(), t, dt, inputs: inputs.clone() };
+        let made = Linearisation {
+            config: minimiser.factored_at().clone(),
+            t,
+            dt,
+            inputs: inputs.clone(),
+            history: history.clone(),
+        };
         let made = Arc::new(made);
         *factored = Some(made.clone());
         *linearisation = Some(made);
+    }
+    if !history.is_empty() {
+        remembered.copy_from_slice(history);
+        parts.terms.iter().filter(|t| t.remembers()).for_each(|t| t.commit(&at, &config.x, remembered));
+        std::mem::swap(history, remembered);
     }
     if parts.inertia.is_some() && dt > 0.0 {
         for ((v, x), x0) in v.iter_mut().zip(&config.x).zip(&before.x) {
@@ -263,13 +282,13 @@ fn restore_factor(
 ) -> Result<(), SolveError> {
     let dt = problem.at.dt;
     let serves = |l: &Linearisation| {
-        model.parts().inertia.is_none()
+        model.parts().inertia.is_none() && model.parts().n_history == 0
             || (l.dt == 0.0) == (dt == 0.0) && (dt == 0.0 || (l.dt / dt).ln().abs() <= DT_DRIFT)
     };
     if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
         let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
         if !(same && minimiser.is_factored()) {
-            let at = At { t: wanted.t, dt: wanted.dt, inputs: &wanted.inputs, ..problem.at };
+            let at = At { t: wanted.t, dt: wanted.dt, inputs: &wanted.inputs, history: &wanted.history, ..problem.at };
             *factored = None;
             minimiser.linearise(&Problem { at, ..*problem }, &wanted.config)?;
             *factored = Some(wanted.clone());
@@ -279,8 +298,13 @@ fn restore_factor(
     *factored = None;
     minimiser.linearise(problem, config)?;
     report.factorisations += 1;
-    let made =
-        Arc::new(Linearisation { config: config.clone(), t: problem.at.t, dt, inputs: problem.at.inputs.to_vec() });
+    let made = Arc::new(Linearisation {
+        config: config.clone(),
+        t: problem.at.t,
+        dt,
+        inputs: problem.at.inputs.to_vec(),
+        history: problem.at.history.to_vec(),
+    });
     *factored = Some(made.clone());
     *linearisation = Some(made);
     Ok(())
@@ -316,8 +340,8 @@ fn move_along(prescribed: &[u32], config: &mut Configuration, u: &mut [Vec3]) {
     }
 }
 
-fn strain_of(model: &Model, x: &[Vec3]) -> Strain {
-    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(x)))
+fn strain_of(model: &Model, at: &At, x: &[Vec3]) -> Strain {
+    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(at, x)))
 }
 
 fn input3(inputs: &[f64], first: Option<usize>, row: usize) -> Vec3 {

@@ -97,3 +97,16 @@ fn finer_heads_come_nearer() {
     assert!(Head { edge: 5.0, ..Head::default() }.mesh().is_err());
     assert!(Head { edge: 1e-9, ..Head::default() }.mesh().is_err());
 }
+
+#[test]
+fn heads_of_every_edge_are_sound() {
+    for edge in [5.5e-3, 6.2e-3, 7.3e-3, 9.1e-3, 12e-3] {
+        let (mesh, report) = Head { edge, ..Head::default() }.mesh().unwrap();
+        assert_sound(&report);
+        let mut places: Vec<_> = mesh.nodes.iter().map(key).collect();
+        places.sort_unstable();
+        assert!(places.windows(2).any(|w| w[0] == w[1]), "no slit at edge {edge}");
+        let (skull, mandible) = (mesh.node_set("skull").unwrap(), mesh.node_set("mandible").unwrap());
+        assert!(skull.nodes.iter().all(|a| mandible.nodes.binary_search(a).is_err()));
+    }
+}

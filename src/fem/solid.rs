@@ -1,0 +1,189 @@
+//! Solid elements: gradients of F-based materials over points of integration.
+//!
+//! ```text
+//! F_q = sum_a x_a (x) dN_a,   W = sum_q w_q psi(F_q),   g_a = sum_q w_q P_q dN_a,   K_ab = sum_q w_q dN_a . dP/dF . dN_b
+//! ```
+//!
+//! Source: Bonet & Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", 2nd ed., 2008, chapter 9.
+
+use super::{At, Curvature, Kernel, Strain};
+use crate::energy::Energy;
+use crate::math::{Mat3, Mat9, Vec3, clamp_eigenvalues};
+
+/// What stands at a point of integration: a law that may know the point (its fibre, its past) and the inputs.
+pub trait Material: Send + Sync {
+    /// What it is, for reports.
+    fn name(&self) -> &'static str;
+    /// Energy density at point `p`, J/m3; +inf where undefined.
+    fn psi(&self, at: &At, p: usize, F: &Mat3) -> f64;
+    /// Energy density and first Piola-Kirchhoff stress (Pa).
+    fn psi_and_P(&self, at: &At, p: usize, F: &Mat3) -> (f64, Mat3);
+    /// Tangent over `vec(F)`, Pa.
+    fn dPdF(&self, at: &At, p: usize, F: &Mat3) -> Mat9;
+    /// Whether its tangent is the same at every F.
+    fn is_quadratic(&self) -> bool {
+        false
+    }
+    /// Whether its energy is strain energy.
+    fn is_elastic(&self) -> bool {
+        true
+    }
+    /// Writes what point `p` has to remember of an accepted step into `history`, the list that `at.history` was.
+    fn commit(&self, _at: &At, _p: usize, _F: &Mat3, _history: &mut [f64]) {}
+    /// Whether `commit` writes anything.
+    fn remembers(&self) -> bool {
+        false
+    }
+}
+
+/// An [`Energy`] as a material that is the same everywhere and has no past.
+pub struct Elastic<M>(pub M);
+
+impl<M: Energy> Material for Elastic<M> {
+    fn name(&self) -> &'static str {
+        M::NAME
+    }
+    fn psi(&self, _at: &At, _p: usize, F: &Mat3) -> f64 {
+        self.0.psi(F)
+    }
+    fn psi_and_P(&self, _at: &At, _p: usize, F: &Mat3) -> (f64, Mat3) {
+        self.0.psi_and_P(F)
+    }
+    fn dPdF(&self, _at: &At, _p: usize, F: &Mat3) -> Mat9 {
+        self.0.dPdF(F)
+    }
+    fn is_quadratic(&self) -> bool {
+        M::NAME == crate::energy::Linear::NAME
+    }
+}
+
+/// Shape gradients (1/m) and weight (m3) at a point of integration.
+pub struct Point<const N: usize> {
+    /// dN_a/dX.
+    pub dN: [Vec3; N],
+    /// Share of the rest volume.
+    pub w: f64,
+}
+
+/// Elements with N nodes and Q points of one material. Point `p = Q e + q`.
+pub struct Solid<M, const N: usize, const Q: usize> {
+    material: M,
+    nodes: Vec<[u32; N]>,
+    points: Vec<[Point<N>; Q]>,
+}
+
+impl<M: Material, const N: usize, const Q: usize> Solid<M, N, Q> {
+    /// The given elements of rest positions `X`; `points` makes the points of one element from its nodes' places.
+    pub fn new(
+        material: M,
+        X: &[Vec3],
+        elements: impl Iterator<Item = [u32; N]>,
+        points: fn(&[Vec3; N]) -> [Point<N>; Q],
+    ) -> Self {
+        let nodes: Vec<[u32; N]> = elements.collect();
+        let points = nodes.iter().map(|n| points(&n.map(|a| X[a as usize]))).collect();
+        Solid { material, nodes, points }
+    }
+}
+
+/// F; positions are taken relative to the first node, since the shape gradients sum to zero: a translation changes no bit
+/// beyond that of the differences.
+fn deformation<const N: usize>(dN: &[Vec3; N], x: &[Vec3; N]) -> Mat3 {
+    let mut F = (x[1] - x[0]) * dN[1].transpose();
+    for a in 2..N {
+        F += (x[a] - x[0]) * dN[a].transpose();
+    }
+    F
+}
+
+impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
+    fn name(&self) -> &'static str {
+        self.material.name()
+    }
+    fn len(&self) -> usize {
+        self.nodes.len()
+    }
+    fn nodes(&self, e: usize) -> [u32; N] {
+        self.nodes[e]
+    }
+    fn energy(&self, at: &At, e: usize, x: &[Vec3; N]) -> f64 {
+        let psi = |(q, point): (usize, &Point<N>)| point.w * self.material.psi(at, Q * e + q, &deformation(&point.dN, x));
+        self.points[e].iter().enumerate().map(psi).sum()
+    }
+    fn gradient(&self, at: &At, e: usize, x: &[Vec3; N], g: &mut [Vec3; N]) -> f64 {
+        let mut energy = 0.0;
+        for (q, point) in self.points[e].iter().enumerate() {
+            let (psi, P) = self.material.psi_and_P(at, Q * e + q, &deformation(&point.dN, x));
+            energy += point.w * psi;
+            let wP = point.w * P;
+            for (g, dN) in g.iter_mut().zip(&point.dN) {
+                let share = wP * dN;
+                *g = if q == 0 { share } else { *g + share };
+            }
+        }
+        energy
+    }
+    fn hessian(&self, at: &At, e: usize, x: &[Vec3; N], curvature: Curvature, upper: &mut [Mat3]) {
+        upper.fill(Mat3::zeros());
+        for (q, point) in self.points[e].iter().enumerate() {
+            let mut H = self.material.dPdF(at, Q * e + q, &deformation(&point.dN, x));
+            if curvature == Curvature::Projected {
+                H = clamp_eigenvalues(&H);
+            }
+            let half = point.dN.map(|dN| contract(&H, &(point.w * dN)));
+            let mut blocks = upper.iter_mut();
+            for a in 0..N {
+                for half_b in &half[a..] {
+                    let block = blocks.next().expect("a block for each pair of nodes");
+                    for j in 0..3 {
+                        *block += point.dN[a][j] * half_b[j];
+                    }
+                }
+            }
+        }
+    }
+    fn strain(&self, at: &At, e: usize, x: &[Vec3; N]) -> Strain {
+        if !self.material.is_elastic() {
+            return Strain::NONE;
+        }
+        self.points[e].iter().enumerate().fold(Strain::NONE, |s, (q, point)| {
+            let F = deformation(&point.dN, x);
+            s.and(Strain {
+                min_det_f: F.determinant(),
+                max_stretch: largest_eigenvalue(&F.tr_mul(&F)).max(0.0).sqrt(),
+                energy: point.w * self.material.psi(at, Q * e + q, &F),
+            })
+        })
+    }
+    fn is_quadratic(&self) -> bool {
+        self.material.is_quadratic()
+    }
+    fn remembers(&self) -> bool {
+        self.material.remembers()
+    }
+    fn commit(&self, at: &At, e: usize, x: &[Vec3; N], history: &mut [f64]) {
+        for (q, point) in self.points[e].iter().enumerate() {
+            self.material.commit(at, Q * e + q, &deformation(&point.dN, x), history);
+        }
+    }
+}
+
+/// dP/dF . w as three 3x3 slabs, one for each column j of P.
+fn contract(H: &Mat9, w: &Vec3) -> [Mat3; 3] {
+    let slab = |j: usize, l: usize| H.fixed_view::<3, 3>(3 * j, 3 * l);
+    [0, 1, 2].map(|j| slab(j, 0) * w[0] + slab(j, 1) * w[1] + slab(j, 2) * w[2])
+}
+
+/// Largest eigenvalue of a symmetric matrix, in closed form.
+///
+/// Source: Smith, "Eigenvalues of a symmetric 3 x 3 matrix", Comm. ACM 4(4), 1961.
+fn largest_eigenvalue(A: &Mat3) -> f64 {
+    let q = A.trace() / 3.0;
+    let B = A - q * Mat3::identity();
+    let p = (B.norm_squared() / 6.0).sqrt();
+    if p <= f64::MIN_POSITIVE {
+        return q;
+    }
+    let r = (0.5 * (B / p).determinant()).clamp(-1.0, 1.0);
+    q + 2.0 * p * (r.acos() / 3.0).cos()
+}
