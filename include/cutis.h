@@ -138,6 +138,17 @@ size_t cutis_sim_message(const struct CutisSim *sim,
                          char *buffer,
                          size_t len);
 
+// What to know about the last cutis_sim_step or cutis_sim_initialise that was done, or about the scene before the
+// first: one line each, empty as a rule. Inverted elements and jumps between bones are told here.
+//
+// Copies as cutis_sim_message does.
+//
+// # Safety
+// `sim` is NULL or a live handle; `buffer` is NULL or holds `len` bytes.
+size_t cutis_sim_warning(const struct CutisSim *sim,
+                         char *buffer,
+                         size_t len);
+
 // Number of ports: everything a host can set or get. They keep their order for the life of the handle.
 //
 // # Safety

@@ -87,6 +87,7 @@ pub struct CutisState {
 struct Inner {
     sim: Sim,
     message: String,
+    warning: String,
     poisoned: bool,
 }
 
@@ -199,7 +200,10 @@ unsafe fn copy_text(text: &str, buffer: *mut c_char, len: usize) -> usize {
 unsafe fn new_sim(why: *mut c_char, why_len: usize, load: impl FnOnce() -> Result<Loaded, String>) -> *mut CutisSim {
     let made = guard::caught(|| Sim::new(Arc::new(load()?.model)).map_err(|why| chain(&why)));
     match made.unwrap_or_else(|why| Err(format!("internal failure: {why}"))) {
-        Ok(sim) => Handle::leak(Inner { sim, message: String::new(), poisoned: false }).cast(),
+        Ok(sim) => {
+            let warning = sim.model().warnings().join("\n");
+            Handle::leak(Inner { sim, message: String::new(), warning, poisoned: false }).cast()
+        }
         Err(reason) => {
             // SAFETY: the caller's promise.
             unsafe { copy_text(&reason, why, why_len) };
@@ -309,6 +313,20 @@ pub unsafe extern "C" fn cutis_sim_free(sim: *mut CutisSim) {
 pub unsafe extern "C" fn cutis_sim_message(sim: *const CutisSim, buffer: *mut c_char, len: usize) -> usize {
     // SAFETY: the caller's promise.
     unsafe { guard::with(sim.cast_mut().cast::<Handle<Inner>>(), |inner| copy_text(&inner.message, buffer, len)) }
+        .unwrap_or(0)
+}
+
+/// What to know about the last cutis_sim_step or cutis_sim_initialise that was done, or about the scene before the
+/// first: one line each, empty as a rule. Inverted elements and jumps between bones are told here.
+///
+/// Copies as cutis_sim_message does.
+///
+/// # Safety
+/// `sim` is NULL or a live handle; `buffer` is NULL or holds `len` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_warning(sim: *const CutisSim, buffer: *mut c_char, len: usize) -> usize {
+    // SAFETY: the caller's promise.
+    unsafe { guard::with(sim.cast_mut().cast::<Handle<Inner>>(), |inner| copy_text(&inner.warning, buffer, len)) }
         .unwrap_or(0)
 }
 
@@ -601,7 +619,9 @@ pub unsafe extern "C" fn cutis_sim_set_time(sim: *mut CutisSim, time: f64) -> Cu
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cutis_sim_initialise(sim: *mut CutisSim) -> CutisStatus {
     let body = |inner: &mut Inner| {
-        inner.sim.initialise().map(drop).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))
+        let report = inner.sim.initialise().map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))?;
+        inner.warning = report.warnings.join("\n");
+        Ok(())
     };
     // SAFETY: the caller's promise.
     unsafe { with(sim, body) }
@@ -620,7 +640,9 @@ pub unsafe extern "C" fn cutis_sim_step(sim: *mut CutisSim, dt: f64) -> CutisSta
         if !(dt.is_finite() && dt > 0.0) {
             return Err(argument(format!("step size {dt} is not positive and finite")));
         }
-        inner.sim.step(dt).map(drop).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))
+        let report = inner.sim.step(dt).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))?;
+        inner.warning = report.warnings.join("\n");
+        Ok(())
     };
     // SAFETY: the caller's promise.
     unsafe { with(sim, body) }

@@ -68,6 +68,9 @@ impl Instance {
             );
             return Err((logger, why));
         }
+        for warning in model.warnings() {
+            logger.log(Status::Warning, Category::Warning, warning);
+        }
         match Sim::new(Arc::new(model)) {
             Ok(sim) => Ok(Self {
                 sim,

@@ -67,6 +67,7 @@ static void misuse(CutisSim *sim, size_t bones, size_t skin) {
     CHECK(isnan(cutis_sim_time(NULL)));
     CHECK(cutis_sim_restore(sim, NULL) == CUTIS_NULL);
     CHECK(cutis_sim_save(NULL) == NULL);
+    CHECK(cutis_sim_warning(sim, message, sizeof message) >= 1 && cutis_sim_warning(NULL, message, 9) == 0);
     CHECK(cutis_sim_message(NULL, message, sizeof message) == 0);
     cutis_sim_free(NULL);
     cutis_state_free(NULL);
