@@ -12,8 +12,8 @@ use super::MeshingError;
 use crate::math::Vec3;
 use crate::mesh::{FaceSet, NodeSet, SKIN, TetMesh, signed_volume};
 
-/// Largest number of nodes a mesh can number.
-const NODE_LIMIT: u64 = u32::MAX as u64;
+/// Most nodes of a block: beyond it a slip of the pen would take all memory of a common machine.
+const NODE_LIMIT: u64 = 1_000_000;
 /// Slack of the layer fractions' sum against 1 (rounding of decimal fractions).
 const FRACTION_SLACK: f64 = 1e-9;
 /// Name of the region that no layer covers.
@@ -48,7 +48,7 @@ pub struct Block {
 ///
 /// # Errors
 /// [`MeshingError::NotPositive`] for an empty box, [`MeshingError::Layers`] for fractions beyond 1,
-/// [`MeshingError::TooLarge`] when the nodes cannot be numbered.
+/// [`MeshingError::TooLarge`] beyond a million nodes.
 pub fn block(spec: &Block) -> Result<TetMesh, MeshingError> {
     let n = grid(spec)?;
     let stride = n.map(|c| c + 1);

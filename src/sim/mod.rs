@@ -21,7 +21,9 @@ use crate::solve::SolveError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimError {
     /// The solver gave up, also with the host step cut into small pieces.
-    #[error("step from t = {t} s by {dt} s: {source} (the load was cut down to 1/{cuts} of the step)")]
+    #[error(
+        "step from t = {t} s by {dt} s: {source} (the load was cut down to 1/{cuts} of the step, {spent} linear solves spent)"
+    )]
     Solve {
         /// Start of the step, s.
         t: f64,
@@ -29,9 +31,14 @@ pub enum SimError {
         dt: f64,
         /// The smallest piece tried was one part in this many.
         cuts: u32,
+        /// Linear solves spent.
+        spent: u32,
         /// What the solver said.
         source: SolveError,
     },
+    /// The solver cannot be set up for this model.
+    #[error(transparent)]
+    Setup(#[from] SolveError),
     /// The step length is no positive number.
     #[error("a step must be a positive, finite number of seconds; found {0}")]
     StepLength(f64),
@@ -105,10 +112,10 @@ impl Sim {
     /// At rest, t = 0, inputs at their start values. Analyses the matrix; solves nothing.
     ///
     /// # Errors
-    /// None so far; the signature leaves room.
+    /// [`SimError::Setup`] for a model whose factor would not fit into memory.
     pub fn new(model: Arc<Model>) -> Result<Sim, SimError> {
         let state = State::start(&model);
-        let work = step::Workspace::new(&model);
+        let work = step::Workspace::new(&model)?;
         Ok(Sim { model, state, work })
     }
 
@@ -127,17 +134,22 @@ impl Sim {
         self.state.t = t;
     }
 
-    /// Seeks the equilibrium at the start inputs; no time passes.
+    /// Seeks the equilibrium at the inputs as set, from rest, whatever came before; no time passes.
     ///
     /// # Errors
     /// As for [`Sim::step`].
     pub fn initialise(&mut self) -> Result<StepReport, SimError> {
-        step::initialise(&self.model, &mut self.state, &mut self.work)
+        let mut state = State::start(&self.model);
+        state.t = self.state.t;
+        state.inputs.copy_from_slice(&self.state.inputs);
+        let report = step::initialise(&self.model, &mut state, &mut self.work)?;
+        self.state = state;
+        Ok(report)
     }
 
     /// Advances by `dt` seconds; all or nothing.
     ///
-    /// A step does at most 64 load cuts of `solver.max_iterations` linear solves each.
+    /// A step spends about five times `solver.max_iterations` linear solves at most, however it is cut.
     ///
     /// # Errors
     /// [`SimError`]; the state is then the last accepted one, with the inputs as set.

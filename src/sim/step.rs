@@ -17,6 +17,8 @@ use crate::solve::{Minimiser, Outcome, Problem};
 const SMALLEST_PIECE: f64 = 1.0 / 64.0;
 /// A piece that turns elements inside out is cut, down to this part of the step; then it is taken and told.
 const SMALLEST_TO_AVOID_INVERSION: f64 = 1.0 / 8.0;
+/// Most linear solves of a whole step, in units of `solver.max_iterations`.
+const BUDGET: u32 = 4;
 /// After a piece that succeeded the next one may be this much larger.
 const GROWTH: f64 = 2.0;
 /// Change of ln dt beyond which the stiffness with inertia is factored anew.
@@ -73,7 +75,7 @@ pub(super) struct Workspace {
 }
 
 impl Workspace {
-    pub fn new(model: &Model) -> Workspace {
+    pub fn new(model: &Model) -> Result<Workspace, SolveError> {
         let parts = model.parts();
         let X = &parts.mesh.nodes;
         let pivots = vec![Vec3::zeros(); parts.bones.len()];
@@ -86,8 +88,8 @@ impl Workspace {
             wrenches: &wrenches,
             at: At { t: 0.0, dt: 0.0, inputs: &parts.start, history: &[], x_tilde: X, x_lag: X },
         };
-        Workspace {
-            minimiser: Minimiser::new(&problem, parts.strategy),
+        Ok(Workspace {
+            minimiser: Minimiser::new(&problem, parts.strategy)?,
             factored: None,
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             before: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
@@ -99,7 +101,7 @@ impl Workspace {
             u: vec![Vec3::zeros(); model.dofs().prescribed.len()],
             pivots,
             wrenches,
-        }
+        })
     }
 
     pub fn minimiser(&self) -> &Minimiser {
@@ -121,10 +123,9 @@ pub(super) fn initialise(model: &Model, state: &mut State, work: &mut Workspace)
         state.outputs.converged = true;
         return Ok(StepReport::new(0));
     }
-    let mut report = advance(model, state, work, 0.0)?;
+    let report = advance(model, state, work, 0.0)?;
     // Nothing has moved yet: the way to the start equilibrium is no velocity.
     state.v.fill(Vec3::zeros());
-    report.substeps = report.substeps.max(1);
     Ok(report)
 }
 
@@ -151,15 +152,17 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
         match step_piece(model, work, &mut linearisation, t, dt * (to - done), to - done, &mut report) {
             Ok(()) => {
                 report.substeps += 1;
+                piece = GROWTH * (to - done);
                 done = to;
-                piece *= GROWTH;
             }
             Err(source) => {
                 work.config.copy_from(&work.before);
                 linearisation = linearised_before;
-                piece *= 0.5;
-                if piece < SMALLEST_PIECE {
-                    return Err(SimError::Solve { t: state.t, dt, cuts: (1.0 / SMALLEST_PIECE) as u32, source });
+                piece = 0.5 * (to - done);
+                report.iterations += source.iterations();
+                if piece < SMALLEST_PIECE || report.iterations > BUDGET * model.parts().strategy.max_iterations {
+                    let cuts = (1.0 / (to - done)).round() as u32;
+                    return Err(SimError::Solve { t: state.t, dt, cuts, spent: report.iterations, source });
                 }
             }
         }

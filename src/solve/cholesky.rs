@@ -8,9 +8,12 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::{LinearSolver, nested_dissection};
+use super::{LinearSolver, SolveError, nested_dissection};
 use crate::fem::{BlockMatrix, Pattern};
 use crate::math::Vec3;
+
+/// Most entries of a factor: 12 GB of numbers.
+pub const MOST_ENTRIES: usize = 1_500_000_000;
 
 /// Supernodal Cholesky in double precision, one thread; the same bits whatever the machine's load.
 pub struct Cholesky {
@@ -24,7 +27,10 @@ pub struct Cholesky {
 
 impl Cholesky {
     /// Orders and analyses the pattern, and allocates everything later calls need.
-    pub fn analyse(pattern: &Pattern) -> Cholesky {
+    ///
+    /// # Errors
+    /// [`SolveError::TooLarge`] for a factor beyond [`MOST_ENTRIES`].
+    pub fn analyse(pattern: &Pattern) -> Result<Cholesky, SolveError> {
         let n = 3 * pattern.n();
         let scalar = scalar_pattern(pattern);
         let order = nested_dissection(pattern).map(|blocks| {
@@ -39,21 +45,25 @@ impl Cholesky {
             Some((forward, inverse)) => SymmetricOrdering::Custom(PermRef::new_checked(forward, inverse, n)),
             None => SymmetricOrdering::Amd,
         };
+        let too_large = |entries: usize| SolveError::TooLarge { unknowns: n, entries, limit: MOST_ENTRIES };
         let symbolic =
             factorize_symbolic_cholesky(scalar.as_ref(), Side::Lower, ordering, CholeskySymbolicParams::default())
-                .expect("a mesh graph's factor fits the index type and memory");
+                .map_err(|_| too_large(u32::MAX as usize))?;
+        if symbolic.len_val() > MOST_ENTRIES {
+            return Err(too_large(symbolic.len_val()));
+        }
         let scratch = StackReq::or(
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
         );
-        Cholesky {
+        Ok(Cholesky {
             values: vec![0.0; scalar.row_idx().len()],
             factor: vec![0.0; symbolic.len_val()],
             rhs: vec![0.0; n],
             scratch: MemBuffer::new(scratch),
             scalar,
             symbolic,
-        }
+        })
     }
 
     /// Stored entries of the factor.
@@ -155,7 +165,7 @@ mod tests {
         let x: Vec<Vec3> = (0..n).map(|i| Vec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
         let mut b = vec![Vec3::zeros(); n];
         A.multiply(&x, &mut b);
-        let mut solver = Cholesky::analyse(&A.pattern);
+        let mut solver = Cholesky::analyse(&A.pattern).expect("a small system");
         solver.factor(&A).expect("diagonally dominant");
         solver.solve(&mut b);
         assert!(x.iter().zip(&b).all(|(x, b)| (x - b).norm() < 1e-10));

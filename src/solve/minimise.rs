@@ -69,13 +69,16 @@ pub struct Minimiser {
 
 impl Minimiser {
     /// Analyses the pattern of the problem's terms and allocates.
-    pub fn new(problem: &Problem, strategy: Strategy) -> Minimiser {
+    ///
+    /// # Errors
+    /// [`SolveError::TooLarge`].
+    pub fn new(problem: &Problem, strategy: Strategy) -> Result<Minimiser, SolveError> {
         let assembly = Assembly::new(problem.terms, problem.dofs);
         let n = problem.dofs.n_blocks();
         let config =
             Configuration { x: problem.X.to_vec(), poses: vec![crate::math::Pose::REST; problem.pivots.len()] };
-        Minimiser {
-            cholesky: Cholesky::analyse(&assembly.K.pattern),
+        Ok(Minimiser {
+            cholesky: Cholesky::analyse(&assembly.K.pattern)?,
             assembly,
             memory: Lbfgs::new(strategy.memory, n),
             strategy,
@@ -88,7 +91,7 @@ impl Minimiser {
             g: vec![Vec3::zeros(); n],
             g_trial: vec![Vec3::zeros(); n],
             d: vec![Vec3::zeros(); n],
-        }
+        })
     }
 
     /// Gradient at the nodes after the last minimisation, N: on prescribed nodes minus the reaction of the tissue.

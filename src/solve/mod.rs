@@ -45,9 +45,31 @@ pub enum SolveError {
     /// The energy is not finite where the step starts.
     #[error("the energy is not finite where the step starts: the bones move further than the tissue can follow")]
     NotFinite,
+    /// The factor would not fit a common machine's memory.
+    #[error(
+        "the factor of {unknowns} unknowns would hold {entries} numbers of 8 bytes or more, the limit is {limit}: use a coarser mesh"
+    )]
+    TooLarge {
+        /// Scalar unknowns.
+        unknowns: usize,
+        /// Entries of the factor.
+        entries: usize,
+        /// Most entries.
+        limit: usize,
+    },
     /// The step would turn elements inside out; a smaller one may not.
     #[error("the step would turn elements inside out")]
     Inverts,
+}
+
+impl SolveError {
+    /// Linear solves spent in vain.
+    pub fn iterations(&self) -> u32 {
+        match self {
+            SolveError::NotConverged { iterations, .. } => *iterations,
+            SolveError::Singular { .. } | SolveError::NotFinite | SolveError::Inverts | SolveError::TooLarge { .. } => 1,
+        }
+    }
 }
 
 /// A solver for symmetric positive definite systems of 3x3 blocks.
