@@ -16,6 +16,8 @@ pub enum Slot {
     BoneForce,
     /// Torque on each force-driven bone, about its pivot.
     BoneTorque,
+    /// Activation of each muscle.
+    MuscleActivation,
     /// Total force of each point or patch load.
     LoadForce,
     /// Pressure of each pressure load.
@@ -97,6 +99,8 @@ pub struct Port {
     pub slot: Slot,
     /// Number type.
     pub ty: Type,
+    /// Whether FMI 3.0 shows it as Float32: hosts that stack all Float64 inputs of a run need one shape for them.
+    pub single: bool,
     /// Extent of each dimension, row-major; empty for a scalar.
     pub shape: Vec<usize>,
     /// SI unit, "1" for none.

@@ -5,6 +5,7 @@
 mod gravity;
 mod inertia;
 mod load;
+mod muscle;
 mod pressure;
 mod tissue;
 mod viscous;
@@ -12,6 +13,7 @@ mod viscous;
 pub use gravity::Gravity;
 pub use inertia::{Inertia, lumped_masses};
 pub use load::DeadLoad;
+pub use muscle::{Muscle, nearest_on_path};
 pub use pressure::Pressure;
 pub use tissue::{Branches, Elements, LAWS, Law, law};
 pub use viscous::{Measure, Viscous};

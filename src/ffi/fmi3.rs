@@ -298,6 +298,7 @@ pub unsafe extern "C" fn fmi3GetFloat64(
         let (references, out) = unsafe {
             (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
         };
+        check_floats(i, references, false)?;
         check_lengths(i, references, Type::Float64, out.len())?;
         let mut rest = out;
         for &reference in references {
@@ -311,6 +312,40 @@ pub unsafe extern "C" fn fmi3GetFloat64(
     };
     // SAFETY: the host's promise about its instance.
     unsafe { on(instance, table::get("fmi3GetFloat64"), body) }
+}
+
+/// `fmi3GetFloat32`: a copy, rounded to single precision.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetFloat32(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    values: *mut f32,
+    nValues: usize,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (references, out) = unsafe {
+            (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
+        };
+        check_floats(i, references, true)?;
+        check_lengths(i, references, Type::Float64, out.len())?;
+        let mut rest = out;
+        for &reference in references {
+            let (port, n) = i.port(reference, Type::Float64).map(|(k, p)| (k, p.len()))?;
+            i.before_get(port)?;
+            let (now, later) = rest.split_at_mut(n);
+            for (k, value) in now.iter_mut().enumerate() {
+                let mut wide = [0.0];
+                i.get_f64(port, k, &mut wide)?;
+                *value = wide[0] as f32;
+            }
+            rest = later;
+        }
+        Ok(())
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(instance, table::get("fmi3GetFloat32"), body) }
 }
 
 /// `fmi3GetInt32`: a copy; between steps nothing is computed.
@@ -386,6 +421,7 @@ pub unsafe extern "C" fn fmi3SetFloat64(
         let (references, values) = unsafe {
             (slice(valueReferences, nValueReferences, "valueReferences")?, slice(values, nValues, "values")?)
         };
+        check_floats(i, references, false)?;
         check_lengths(i, references, Type::Float64, values.len())?;
         let mut rest = values;
         for &reference in references {
@@ -405,6 +441,42 @@ pub unsafe extern "C" fn fmi3SetFloat64(
     };
     // SAFETY: the host's promise about its instance.
     unsafe { on(instance, table::set("fmi3SetFloat64"), body) }
+}
+
+/// `fmi3SetFloat32`: checked as a whole, then written as a whole; nothing is computed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3SetFloat32(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    values: *const f32,
+    nValues: usize,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (references, values) = unsafe {
+            (slice(valueReferences, nValueReferences, "valueReferences")?, slice(values, nValues, "values")?)
+        };
+        check_floats(i, references, true)?;
+        check_lengths(i, references, Type::Float64, values.len())?;
+        let mut rest = values;
+        for &reference in references {
+            let (_, port) = i.port(reference, Type::Float64)?;
+            let (now, later) = rest.split_at(port.len());
+            now.iter().enumerate().try_for_each(|(k, v)| i.check_set(port, k, &[f64::from(*v)]))?;
+            rest = later;
+        }
+        let mut rest = values;
+        for &reference in references {
+            let (port, n) = i.port(reference, Type::Float64).map(|(k, p)| (k, p.len()))?;
+            let (now, later) = rest.split_at(n);
+            now.iter().enumerate().try_for_each(|(k, v)| i.set(port, k, &[f64::from(*v)]))?;
+            rest = later;
+        }
+        Ok(())
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(instance, table::set("fmi3SetFloat32"), body) }
 }
 
 /// `fmi3SetInt32`: no variable of this type can be set.
@@ -439,6 +511,18 @@ fn nothing_settable(n_references: usize, n_values: usize) -> Answer {
     if n_references == 0 && n_values == 0 { Ok(()) } else { Err(error("no variable of this type can be set")) }
 }
 
+/// Float64 variables go through the Float64 functions, those that FMI shows as Float32 through the others.
+fn check_floats(i: &Instance, references: &[u32], single: bool) -> Answer {
+    for &reference in references {
+        let (_, port) = i.port(reference, Type::Float64)?;
+        if port.single != single {
+            let wanted = if port.single { "Float32" } else { "Float64" };
+            return Err(error(format!("`{}` (value reference {reference}) is {wanted}", port.name)));
+        }
+    }
+    Ok(())
+}
+
 /// `nValues` must be the sum of the sizes of all variables named (FMI 3.0.2, section 2.2.7.2).
 fn check_lengths(instance: &Instance, references: &[u32], ty: Type, n_values: usize) -> Answer {
     let mut wanted = 0;
@@ -453,7 +537,6 @@ fn check_lengths(instance: &Instance, references: &[u32], ty: Type, n_values: us
 }
 
 no_variable_of_type! {
-    fmi3GetFloat32 fmi3SetFloat32 f32;
     fmi3GetInt8 fmi3SetInt8 i8;
     fmi3GetUInt8 fmi3SetUInt8 u8;
     fmi3GetInt16 fmi3SetInt16 i16;

@@ -132,13 +132,16 @@ struct Definition {
     name: String,
     unit: &'static str,
     ty: Type,
+    single: bool,
     min: Option<f64>,
     max: Option<f64>,
 }
 
 impl Definition {
     fn fits(&self, port: &Port) -> bool {
-        self.ty == port.ty && self.unit == port.unit && self.min == port.min && self.max == port.max
+        (self.ty, self.single, self.unit) == (port.ty, port.single, port.unit)
+            && self.min == port.min
+            && self.max == port.max
     }
 }
 
@@ -153,7 +156,7 @@ impl Types {
             // A type may not share its name with a variable; ours begin with a capital, theirs do not.
             let same = definitions.iter().filter(|d| d.unit == port.unit).count();
             let name = if same == 0 { quantity.to_owned() } else { format!("{quantity}{}", same + 1) };
-            definitions.push(Definition { name, unit: port.unit, ty: port.ty, min: port.min, max: port.max });
+            definitions.push(Definition { name, unit: port.unit, ty: port.ty, single: port.single, min: port.min, max: port.max });
         }
         Self { definitions }
     }
@@ -190,7 +193,7 @@ impl Types {
                 match version {
                     FmiVersion::V3 => {
                         attributes.insert(0, ("name", definition.name.clone()));
-                        empty(xml, "Float64Type", attributes);
+                        empty(xml, if definition.single { "Float32Type" } else { "Float64Type" }, attributes);
                     }
                     FmiVersion::V2 => element(xml, "SimpleType", vec![("name", definition.name.clone())], |xml| {
                         empty(xml, "Real", attributes)
@@ -238,6 +241,7 @@ fn about(port: &Port) -> String {
 
 fn variable3(xml: &mut Xml, port: &Port, types: &Types) {
     let tag = match port.ty {
+        Type::Float64 if port.single => "Float32",
         Type::Float64 => "Float64",
         Type::Int32 => "Int32",
         Type::Boolean => "Boolean",

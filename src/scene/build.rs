@@ -2,11 +2,11 @@
 
 use super::SceneError;
 use super::check::Text;
-use super::file::{BoneSpec, LoadSpec, PressureSpec, SceneFile, TissueSpec, ViscousSpec};
+use super::file::{BoneSpec, LoadSpec, MuscleSpec, PressureSpec, SceneFile, TissueSpec, ViscousSpec};
 use super::keys::find;
 use super::place::{area_shares, nearest_point, patch, volume_shares};
 use super::programme::{Programme, Track};
-use crate::effect::{self, Branches, DeadLoad, Elements, Gravity, Inertia, Law, Pressure, lumped_masses};
+use crate::effect::{self, Branches, DeadLoad, Elements, Gravity, Inertia, Law, Muscle, Pressure, lumped_masses, nearest_on_path};
 use crate::energy::Lame;
 use crate::fem::{Term, add_midsides};
 use crate::math::Vec3;
@@ -50,6 +50,7 @@ impl Builder<'_> {
             mesh: mesh_spec,
             tissue: _,
             bone,
+            muscle,
             load,
             pressure,
             marker,
@@ -77,10 +78,16 @@ impl Builder<'_> {
             free_rings(&mesh, &mut bones, rings, &mut warnings);
         }
         let counts: Vec<(Drive, usize)> = bones.iter().map(|b| (b.drive, b.nodes.len())).collect();
-        let layout = Layout::new(&counts, load.len(), pressure.len(), gravity.is_some());
+        let layout = Layout::new(&counts, muscle.len(), load.len(), pressure.len(), gravity.is_some());
         let mut start = vec![0.0; layout.len()];
         self.bone_starts(bone, &bones, &mesh, &layout, &mut start)?;
 
+        let muscles = self.text.names("muscle", muscle.iter().map(|m| &m.name))?;
+        for (k, spec) in muscle.iter().enumerate() {
+            let input = layout.first(Slot::MuscleActivation).expect("a scene with muscles has their port") + k;
+            terms.push(self.muscle(spec, &mesh, &midsides, input)?);
+            start[input] = self.text.number("muscle", "activation", &spec.activation)?.unwrap_or(0.0);
+        }
         let loads = self.text.names("load", load.iter().map(|l| &l.name))?;
         for (k, spec) in load.iter().enumerate() {
             let input = layout.first(Slot::LoadForce).expect("a scene with loads has their port") + 3 * k;
@@ -139,6 +146,7 @@ impl Builder<'_> {
             mesh,
             midsides,
             bones,
+            muscles,
             loads,
             pressures,
             markers,
@@ -344,6 +352,50 @@ impl Builder<'_> {
             }
         }
         Ok(())
+    }
+
+    fn muscle(
+        &self,
+        spec: &MuscleSpec,
+        mesh: &TetMesh,
+        midsides: &[[u32; 6]],
+        input: usize,
+    ) -> Result<Box<dyn Term>, SceneError> {
+        let path: Vec<Vec3> = spec.path.get_ref().iter().map(|p| Vec3::from(*p)).collect();
+        let sound = path.len() >= 2
+            && path.iter().all(|p| p.iter().all(|c| c.is_finite()))
+            && path.windows(2).all(|s| s[0] != s[1]);
+        if !sound {
+            let message = "`path` takes at least two finite points, each other than the one before".to_owned();
+            return Err(self.text.at(spec.path.span().start, message));
+        }
+        let radius = self.text.checked("muscle", "radius", &spec.radius)?;
+        let mut fibre = Vec::new();
+        let (mut tets, mut mids) = (Vec::new(), Vec::new());
+        for (e, tet) in mesh.tets.iter().enumerate() {
+            let centre = tet.iter().map(|&a| mesh.nodes[a as usize]).sum::<Vec3>() / 4.0;
+            let (along, distance) = nearest_on_path(&path, &centre);
+            if distance <= radius {
+                tets.push(*tet);
+                mids.extend(midsides.get(e));
+                fibre.extend(std::iter::repeat_n(along, if midsides.is_empty() { 1 } else { 4 }));
+            }
+        }
+        if tets.is_empty() {
+            let message = format!(
+                "muscle `{}` holds no tetrahedron: no centre lies within {radius} m of its path; make `radius` larger or \
+                 the mesh finer",
+                spec.name.get_ref()
+            );
+            return Err(self.text.at(spec.name.span().start, message));
+        }
+        let muscle = Muscle {
+            fibre,
+            T0: self.text.number("muscle", "stress", &spec.stress)?.unwrap_or(100e3),
+            width: self.text.number("muscle", "width", &spec.width)?,
+            input,
+        };
+        Ok(Elements { X: &mesh.nodes, tets: &tets, midsides: &mids }.of(muscle))
     }
 
     fn load(&self, spec: &LoadSpec, mesh: &TetMesh, input: usize) -> Result<DeadLoad, SceneError> {

@@ -19,6 +19,8 @@ pub struct SceneFile {
     #[serde(default)]
     pub bone: Vec<BoneSpec>,
     #[serde(default)]
+    pub muscle: Vec<MuscleSpec>,
+    #[serde(default)]
     pub load: Vec<LoadSpec>,
     #[serde(default)]
     pub pressure: Vec<PressureSpec>,
@@ -154,6 +156,17 @@ pub struct BoneSpec {
     pub rotation: Option<Triple>,
     pub force: Option<Triple>,
     pub torque: Option<Triple>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MuscleSpec {
+    pub name: Spanned<String>,
+    pub path: Spanned<Vec<[f64; 3]>>,
+    pub radius: Spanned<f64>,
+    pub stress: Option<Spanned<f64>>,
+    pub width: Option<Spanned<f64>>,
+    pub activation: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

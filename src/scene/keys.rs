@@ -40,6 +40,7 @@ impl fmt::Display for Range {
             Range::Any => write!(f, "any"),
             Range::Positive => write!(f, "> 0"),
             Range::NonNegative => write!(f, ">= 0"),
+            Range::From(low, high) if *high == 1.0 + f64::EPSILON => write!(f, "{low} <= . <= 1"),
             Range::From(low, high) => write!(f, "{low} <= . < {high}"),
             Range::AtLeastOne => write!(f, ">= 1"),
             Range::OneOf(names) => {
@@ -110,6 +111,7 @@ pub const KEYS: &[Key] = &[
         "Materials; each region of the mesh takes the first that names it.",
     ),
     key("", "bone", "array of tables", "", Any, "none", "Bones that hold or move the tissue."),
+    key("", "muscle", "array of tables", "", Any, "none", "Muscles that the host activates."),
     key("", "load", "array of tables", "", Any, "none", "Forces on a point, a patch of skin or a region."),
     key("", "pressure", "array of tables", "", Any, "none", "Pressures that follow the surface."),
     key("", "marker", "array of tables", "", Any, "none", "Points on the skin that the host reads."),
@@ -262,6 +264,12 @@ pub const KEYS: &[Key] = &[
     ),
     key("bone", "force", "[float; 3]", "N", Any, "[0, 0, 0]", "Start value of `bone.force`."),
     key("bone", "torque", "[float; 3]", "N m", Any, "[0, 0, 0]", "Start value of `bone.torque`."),
+    key("muscle", "name", "string", "", Any, "required", "Name: the row of `muscle.activation`."),
+    key("muscle", "path", "array of [float; 3]", "m", Any, "required", "Points from origin to insertion; fibres run along it."),
+    key("muscle", "radius", "float", "m", Positive, "required", "Tetrahedra whose centre is nearer to the path belong to the muscle."),
+    key("muscle", "stress", "float", "Pa", Positive, "100e3", "Nominal stress at full activation."),
+    key("muscle", "width", "float", "", Positive, "none", "Half width of the force-length curve in stretch; without it force does not depend on length."),
+    key("muscle", "activation", "float", "", From(0.0, 1.0 + f64::EPSILON), "0", "Start value of `muscle.activation`."),
     key("load", "name", "string", "", Any, "required", "Name: the row of `load.force`."),
     key("load", "at", "[float; 3]", "m", Any, "none", "Place on the skin; the nearest skin node without `radius`."),
     key(

@@ -74,6 +74,8 @@ pub struct ModelParts {
     pub midsides: Vec<[u32; 6]>,
     /// Bones, in the order of the ports' rows; no node belongs to two.
     pub bones: Vec<Bone>,
+    /// Names of the muscles, in order.
+    pub muscles: Vec<String>,
     /// Names of the force loads, in order.
     pub loads: Vec<String>,
     /// Names of the pressure loads, in order.

@@ -11,8 +11,14 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Lays out the inputs of a scene with these bones `(drive, nodes)`, forces and pressures.
-    pub fn new(bones: &[(Drive, usize)], n_loads: usize, n_pressures: usize, gravity: bool) -> Layout {
+    /// Lays out the inputs of a scene with these bones `(drive, nodes)`, muscles, forces and pressures.
+    pub fn new(
+        bones: &[(Drive, usize)],
+        n_muscles: usize,
+        n_loads: usize,
+        n_pressures: usize,
+        gravity: bool,
+    ) -> Layout {
         let n = 3 * bones.len();
         let any = |drive: Drive| bones.iter().any(|(d, _)| *d == drive);
         let mut layout = Layout { spans: Vec::new(), len: 0 };
@@ -26,6 +32,7 @@ impl Layout {
         add(Slot::BoneRotation, n, any(Drive::Pose));
         add(Slot::BoneForce, n, any(Drive::Force));
         add(Slot::BoneTorque, n, any(Drive::Force));
+        add(Slot::MuscleActivation, n_muscles, true);
         add(Slot::LoadForce, 3 * n_loads, true);
         add(Slot::LoadPressure, n_pressures, true);
         add(Slot::Gravity, 3, gravity);
@@ -68,6 +75,7 @@ fn reference(slot: Slot) -> u32 {
         Slot::BoneRotation => 11,
         Slot::BoneForce => 12,
         Slot::BoneTorque => 13,
+        Slot::MuscleActivation => 14,
         Slot::LoadForce => 15,
         Slot::LoadPressure => 16,
         Slot::Gravity => 50,
@@ -120,8 +128,9 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
             unit,
             causality,
             start,
-            min: None,
-            max: None,
+            single: slot == Slot::MuscleActivation,
+            min: (slot == Slot::MuscleActivation).then_some(0.0),
+            max: (slot == Slot::MuscleActivation).then_some(1.0),
             rows: rows.to_vec(),
             description: description.into(),
         });
@@ -169,6 +178,16 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
         Input,
         &bones,
         "Torque on each force-driven bone, about its pivot",
+    );
+    add(
+        Slot::MuscleActivation,
+        "muscle.activation",
+        Float64,
+        &[parts.muscles.len()],
+        "1",
+        Input,
+        &parts.muscles,
+        "Activation of each muscle, from 0 (slack) to 1 (full stress)",
     );
     add(
         Slot::LoadForce,

@@ -2,7 +2,7 @@
 //!
 //! Along a direction, since det F is linear in each single entry: entrywise differences would be exact and show no order.
 
-use cutis::effect::{DeadLoad, Elements, Gravity, Inertia, LAWS, Pressure};
+use cutis::effect::{DeadLoad, Elements, Gravity, Inertia, LAWS, Muscle, Pressure};
 use cutis::energy::{
     Corotational, Energy, Fung, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, StableNeoHookean,
     Stretches, VerondaWestmann, WithBulk, Yeoh,
@@ -163,6 +163,16 @@ fn terms_have_the_derivatives_they_claim() {
     check_term(&Inertia { m }, &rest, SEED + 2);
     check_term(&DeadLoad { shares: vec![(1, 0.25), (4, 0.75)], input: 1 }, &rest, SEED + 3);
     check_term(&Pressure { triangles: vec![[0, 1, 2], [1, 4, 2]], input: 3 }, &rest, SEED + 4);
+}
+
+#[test]
+fn muscles_have_the_derivatives_they_claim() {
+    let rest = REST.map(Vec3::from);
+    let elements = Elements { X: &rest, tets: &TETS, midsides: &[] };
+    let fibre = vec![Vec3::new(0.6, 0.8, 0.0), Vec3::new(0.0, 0.6, 0.8)];
+    for width in [None, Some(0.6)] {
+        check_term(&*elements.of(Muscle { fibre: fibre.clone(), T0: 2.0, width, input: 1 }), &rest, SEED + 6);
+    }
 }
 
 #[test]

@@ -103,3 +103,19 @@ fn half_the_load_gives_half_the_answer_where_the_tissue_is_linear() {
     let error = largest((0..rest.len()).map(|k| (full[k] - rest[k]) - 2.0 * (half[k] - rest[k])));
     assert!(error < 1e-12 && first.iterations <= 3, "off by {error:.1e}, {first:?}");
 }
+
+#[test]
+fn a_muscle_pulls_with_its_stress_and_its_sides_with_nothing() {
+    // Both ends held: the active nominal stress reaches the bones whole, and nu = 0 keeps the sides still.
+    let mut sim = sim(
+        "[mesh.block]\nsize = [0.1, 0.02, 0.02]\ncells = [10, 2, 2]\n[[tissue]]\nenergy = \"linear\"\nE = 2e4\nnu = 0.0\n\
+         [[bone]]\nname = \"left\"\nnodes = \"x_min\"\n[[bone]]\nname = \"right\"\nnodes = \"x_max\"\n\
+         [[muscle]]\nname = \"whole\"\npath = [[0, 0.01, 0.01], [0.1, 0.01, 0.01]]\nradius = 0.1\nstress = 5e3\n",
+    );
+    set(&mut sim, "muscle.activation", 0, &[0.5]);
+    sim.step(0.1).expect("an activated bar");
+    let f = get(&sim, "bone.reactionForce");
+    assert!((f[0] - 0.5 * 5e3 * 4e-4).abs() < 1e-9 && (f[3] + f[0]).abs() < 1e-9, "{f:?}");
+    let error = largest(get(&sim, "skin.position").iter().zip(get(&sim, "skin.restPosition")).map(|(x, X)| x - X));
+    assert!(error < 1e-12, "a uniform pull between held ends moves nothing: {error:.1e}");
+}
