@@ -7,6 +7,8 @@ mod common;
 mod derivatives;
 #[path = "verify/golden.rs"]
 mod golden;
+#[path = "verify/head.rs"]
+mod head;
 #[path = "verify/invariants.rs"]
 mod invariants;
 #[path = "verify/loads.rs"]

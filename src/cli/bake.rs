@@ -63,19 +63,19 @@ impl Bake {
         for warning in &baked.warnings {
             eprintln!("warning: {warning}");
         }
-        print!("{}", baked.report);
+        say!("{}", baked.report);
         for set in &baked.mesh.node_sets {
-            println!("bone {:<12} {} nodes", set.name, set.nodes.len());
+            say!("bone {:<12} {} nodes", set.name, set.nodes.len());
         }
         for layer in &baked.layers {
-            println!("layer {:<11} {:.1} % of the volume", layer.name, 100.0 * layer.reached);
+            say!("layer {:<11} {:.1} % of the volume", layer.name, 100.0 * layer.reached);
         }
-        println!(
+        say!(
             "slit: {} nodes doubled; {} bone nodes released between two bones",
             baked.slit_nodes, baked.released_nodes
         );
         io::write_mesh(&self.out, &baked.mesh)?;
-        println!("wrote {}", self.out.display());
+        say!("wrote {}", self.out.display());
         Ok(())
     }
 }

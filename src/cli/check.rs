@@ -15,21 +15,21 @@ impl Check {
         let loaded = load::from_file(&self.scene)?;
         let model = &loaded.model;
         let mesh = model.mesh();
-        println!("{}: {} nodes, {} tets, token {}", model.name(), mesh.nodes.len(), mesh.tets.len(), model.token());
+        say!("{}: {} nodes, {} tets, token {}", model.name(), mesh.nodes.len(), mesh.tets.len(), model.token());
         let volume: f64 = (0..mesh.tets.len()).map(|e| mesh.volume(e)).sum();
-        println!("volume {:.2} mL", 1e6 * volume);
+        say!("volume {:.2} mL", 1e6 * volume);
         for (r, name) in mesh.region_names.iter().enumerate() {
-            println!("  region {name}: {} tets", mesh.region.iter().filter(|&&x| x as usize == r).count());
+            say!("  region {name}: {} tets", mesh.region.iter().filter(|&&x| x as usize == r).count());
         }
         for set in &mesh.face_sets {
-            println!("  faces {}: {} triangles", set.name, set.triangles.len());
+            say!("  faces {}: {} triangles", set.name, set.triangles.len());
         }
         for bone in &model.parts().bones {
-            println!("  bone {}: {} nodes, {}", bone.name, bone.nodes.len(), bone.drive);
+            say!("  bone {}: {} nodes, {}", bone.name, bone.nodes.len(), bone.drive);
         }
-        println!("{:>6}  {:<28} {:<12} {:<6} direction", "ref", "variable", "shape", "unit");
+        say!("{:>6}  {:<28} {:<12} {:<6} direction", "ref", "variable", "shape", "unit");
         for p in model.ports() {
-            println!(
+            say!(
                 "{:>6}  {:<28} {:<12} {:<6} {:?}",
                 p.reference,
                 p.name,
@@ -39,7 +39,7 @@ impl Check {
             );
         }
         for warning in model.warnings() {
-            println!("warning: {warning}");
+            say!("warning: {warning}");
         }
         Ok(())
     }

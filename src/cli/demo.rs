@@ -89,29 +89,29 @@ impl Demo {
         let moved =
             |(_, x): &(&str, Vec<Vec3>)| x.iter().zip(&skin.nodes).map(|(x, X)| (x - X).norm()).fold(0.0, f64::max);
         let jaw = Vec3::from_column_slice(&reaction[3..6]);
-        println!("{report}");
-        println!("FMI 3.0 archive      {} ({:.2} MB)", archives[0].0.display(), archives[0].1 as f64 / 1e6);
-        println!("FMI 2.0 archive      {} ({:.2} MB)", archives[1].0.display(), archives[1].1 as f64 / 1e6);
-        println!("nodes, tets          {}, {}", model.mesh().nodes.len(), model.mesh().tets.len());
-        println!("skin vertices        {}", skin.nodes.len());
-        println!("unpack + instantiate {:.2} s", instantiated.as_secs_f64());
-        println!(
+        say!("{report}");
+        say!("FMI 3.0 archive      {} ({:.2} MB)", archives[0].0.display(), archives[0].1 as f64 / 1e6);
+        say!("FMI 2.0 archive      {} ({:.2} MB)", archives[1].0.display(), archives[1].1 as f64 / 1e6);
+        say!("nodes, tets          {}, {}", model.mesh().nodes.len(), model.mesh().tets.len());
+        say!("skin vertices        {}", skin.nodes.len());
+        say!("unpack + instantiate {:.2} s", instantiated.as_secs_f64());
+        say!(
             "step                 {:.1} ms mean, {:.1} ms worst, of {} steps",
             1e3 * spent.as_secs_f64() / programme.steps() as f64,
             1e3 * slowest.as_secs_f64(),
             programme.steps()
         );
         for panel in &panels[1..] {
-            println!("{:<20} moves the skin by up to {:.2} mm", panel.0.to_lowercase(), 1e3 * moved(panel));
+            say!("{:<20} moves the skin by up to {:.2} mm", panel.0.to_lowercase(), 1e3 * moved(panel));
         }
-        println!("jaw reaction         {:.2} N when advanced ({:.2}, {:.2}, {:.2})", jaw.norm(), jaw.x, jaw.y, jaw.z);
-        println!("residual             {residual:.1e} N");
-        println!("smallest det F       {quality:.3}");
-        println!("wrote {}", series.save()?.display());
+        say!("jaw reaction         {:.2} N when advanced ({:.2}, {:.2}, {:.2})", jaw.norm(), jaw.x, jaw.y, jaw.z);
+        say!("residual             {residual:.1e} N");
+        say!("smallest det F       {quality:.3}");
+        say!("wrote {}", series.save()?.display());
         let path = self.out.join("picture.png");
         let panels: Vec<(&str, &[Vec3])> = panels.iter().map(|(name, x)| (*name, x.as_slice())).collect();
         io::write_bytes(&path, &picture(&skin, &panels).to_png())?;
-        println!("wrote {}", path.display());
+        say!("wrote {}", path.display());
         Ok(())
     }
 }

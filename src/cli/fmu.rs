@@ -20,7 +20,7 @@ pub struct Fmu {
 impl Fmu {
     pub fn run(self) -> super::Done {
         for (path, bytes) in write(self.scene.as_deref(), self.library.as_deref(), &self.out)? {
-            println!("wrote {} ({:.2} MB)", path.display(), bytes as f64 / 1e6);
+            say!("wrote {} ({:.2} MB)", path.display(), bytes as f64 / 1e6);
         }
         Ok(())
     }

@@ -1,5 +1,13 @@
 //! The commands, one a file.
 
+/// `println!` that does not mind a reader who has gone (`cutis check scene.toml | head`).
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
 mod bake;
 mod check;
 mod demo;

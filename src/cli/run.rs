@@ -65,7 +65,7 @@ impl Run {
         }
         bar.finish_and_clear();
         table.save(&self.out.join("ports.csv"))?;
-        println!(
+        say!(
             "{}: {} nodes, {} tets, {} steps of {} s; {:.1} ms and {:.1} linear solves a step",
             model.name(),
             model.mesh().nodes.len(),
@@ -75,12 +75,12 @@ impl Run {
             1e3 * spent.as_secs_f64() / programme.steps() as f64,
             f64::from(iterations) / programme.steps() as f64
         );
-        println!("wrote {}", self.out.join("ports.csv").display());
+        say!("wrote {}", self.out.join("ports.csv").display());
         if !self.table_only {
-            println!("wrote {}", series.save()?.display());
+            say!("wrote {}", series.save()?.display());
             let image = picture(model.mesh(), &[("start", &start), ("end", sim.positions())]);
             cutis::io::write_bytes(&self.out.join("picture.png"), &image.to_png())?;
-            println!("wrote {}", self.out.join("picture.png").display());
+            say!("wrote {}", self.out.join("picture.png").display());
         }
         Ok(())
     }
