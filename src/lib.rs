@@ -21,4 +21,5 @@ pub mod port;
 pub mod scene;
 pub mod sim;
 pub mod solve;
+pub mod torture;
 pub mod view;
