@@ -6,5 +6,7 @@
 mod common;
 #[path = "robust/inputs.rs"]
 mod inputs;
+#[path = "robust/torture.rs"]
+mod torture;
 #[path = "robust/violent.rs"]
 mod violent;

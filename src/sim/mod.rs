@@ -22,7 +22,7 @@ use crate::solve::SolveError;
 pub enum SimError {
     /// The solver gave up, also with the host step cut into small pieces.
     #[error(
-        "step from t = {t} s by {dt} s: {source} (the load was cut down to 1/{cuts} of the step, {spent} linear solves spent)"
+        "step from t = {t:?} s by {dt:?} s: {source} (the load was cut down to 1/{cuts} of the step, {spent} linear solves spent)"
     )]
     Solve {
         /// Start of the step, s.

@@ -17,7 +17,7 @@ use std::time::Instant;
 pub use trial::Tally;
 use trial::End;
 
-/// One laws of each kind: quadratic, rotated, finite through inversion, infinite at J = 0, exponential.
+/// One law of each kind: quadratic, rotated, finite through inversion, infinite at J = 0, exponential.
 const LAWS: &[&str] = &["linear", "corotational", "stable-neo-hookean", "neo-hookean", "fung"];
 /// For cases that ask nothing of the law.
 const ONE_LAW: &[&str] = &["stable-neo-hookean"];
@@ -93,12 +93,14 @@ impl Case {
         // The tally is numbers only, whole at any time.
         let end = catch_unwind(AssertUnwindSafe(|| (self.body)(law, &mut tally)));
         let seconds = start.elapsed().as_secs_f64();
+        let legal = self.may_invert.contains(&law);
         let outcome = match end {
-            Ok(Ok(())) if tally.min_det_f > 0.0 => Outcome::Answer,
-            Ok(Ok(())) => Outcome::Inverted { legal: self.may_invert.contains(&law) },
-            Ok(Err(End::Refused(message))) => Outcome::Refused(message),
-            Ok(Err(End::Fail(message))) => Outcome::Fail(message),
             Err(panic) => Outcome::Fail(format!("panic: {}", text_of(&*panic))),
+            Ok(Err(End::Fail(message))) => Outcome::Fail(message),
+            Ok(_) if tally.min_det_f <= 0.0 && !legal => Outcome::Inverted { legal },
+            Ok(Err(End::Refused(message))) => Outcome::Refused(message),
+            Ok(Ok(())) if tally.min_det_f <= 0.0 => Outcome::Inverted { legal },
+            Ok(Ok(())) => Outcome::Answer,
         };
         Row { case: self.name, law, outcome, tally, seconds }
     }

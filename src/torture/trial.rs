@@ -44,6 +44,8 @@ pub fn fail<T>(message: impl Into<String>) -> Result<T, End> {
 
 pub struct Trial<'a> {
     pub sim: Sim,
+    /// Whether a bone was given another place since the last accepted step.
+    bones_move: bool,
     tally: &'a mut Tally,
 }
 
@@ -63,13 +65,14 @@ impl<'a> Trial<'a> {
 
     fn of(model: crate::sim::Model, tally: &'a mut Tally) -> Result<Trial<'a>, End> {
         let sim = Sim::new(Arc::new(model)).map_err(|e| End::Fail(format!("no simulation: {e}")))?;
-        Ok(Trial { sim, tally })
+        Ok(Trial { sim, bones_move: false, tally })
     }
 
     /// Sets elements of an input port by name.
     pub fn set(&mut self, name: &str, offset: usize, values: &[f64]) -> Result<(), End> {
         let port = self.sim.model().ports().iter().position(|p| p.name == name);
         let port = port.ok_or_else(|| End::Fail(format!("no port `{name}`")))?;
+        self.bones_move |= name.starts_with("bone.");
         self.sim.set_f64(port, offset, values).map_err(|e| End::Fail(e.to_string()))
     }
 
@@ -92,6 +95,7 @@ impl<'a> Trial<'a> {
                 self.tally.iterations += report.iterations;
                 self.tally.min_det_f = self.tally.min_det_f.min(report.min_det_f);
                 self.tally.energy = report.elastic;
+                self.bones_move = false;
                 if report.iterations > MOST_SOLVES {
                     return fail(format!("a step took {} linear solves", report.iterations));
                 }
@@ -112,7 +116,12 @@ impl<'a> Trial<'a> {
                     return fail(format!("a refused step changed the state: {e}"));
                 }
                 self.check_finite()?;
-                Err(End::Refused(e.to_string()))
+                let message = e.to_string();
+                // Every scene here is held, so these two blame what is not at fault.
+                if message.contains("hold a bone") || !self.bones_move && message.contains("the bones move") {
+                    return fail(format!("refused with the wrong reason: {message}"));
+                }
+                Err(End::Refused(message))
             }
         }
     }
