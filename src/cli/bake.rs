@@ -72,7 +72,8 @@ impl Bake {
         }
         say!(
             "slit: {} nodes doubled; {} bone nodes released between two bones",
-            baked.slit_nodes, baked.released_nodes
+            baked.slit_nodes,
+            baked.released_nodes
         );
         io::write_mesh(&self.out, &baked.mesh)?;
         say!("wrote {}", self.out.display());

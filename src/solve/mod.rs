@@ -67,7 +67,9 @@ impl SolveError {
     pub fn iterations(&self) -> u32 {
         match self {
             SolveError::NotConverged { iterations, .. } => *iterations,
-            SolveError::Singular { .. } | SolveError::NotFinite | SolveError::Inverts | SolveError::TooLarge { .. } => 1,
+            SolveError::Singular { .. } | SolveError::NotFinite | SolveError::Inverts | SolveError::TooLarge { .. } => {
+                1
+            }
         }
     }
 }
