@@ -1,7 +1,7 @@
 //! From a head CT to a mesh of the face: region, surfaces, bones, tetrahedra, slit, layers, and what to beware of.
 
 use super::assemble::{Assembled, Bone, Kind, Naming, assemble};
-use super::clean::{crop, flood, one_body, outer_air, solid_bones};
+use super::clean::{crop, flood, one_body, outer_air, soften_islands, solid_bones};
 use super::distance::{travel, unsigned};
 use super::face::{condyles, empty, mouth, nose_tip, region};
 use super::label::{LayerShare, Layers};
@@ -27,6 +27,9 @@ const FAT_HU: f64 = -10.0;
 const PASSAGE: f64 = 3e-3;
 /// Search reach for the nearest bone, m.
 const REACH: f64 = 0.06;
+
+/// Search reach for a second bone, m: beyond the crowns of the teeth.
+const NEAR: f64 = 0.013;
 
 /// How to bake.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,6 +86,8 @@ pub struct Baked {
     pub layers: Vec<LayerShare>,
     /// Tops of the right and the left condyle, LPS, m: the jaw opens about the line through them.
     pub condyles: Option<[Vec3; 2]>,
+    /// Box in which the lips were parted, corners in LPS metres.
+    pub mouth: Option<[Vec3; 2]>,
     /// Nodes doubled along the oral slit.
     pub slit_nodes: usize,
     /// Bone nodes released because a second bone is near.
@@ -113,6 +118,7 @@ pub fn bake(
     let mut part = part_of(volume, &region);
     progress("surfaces", 0.05);
     one_body(&mut part, options.skin_hu);
+    soften_islands(&mut part, options.bone_hu);
     let first = Distance::to_isosurface(&part, options.bone_hu);
     if first.surface.triangles.is_empty() {
         return Err(empty("bone", options.bone_hu, &part));
@@ -125,7 +131,8 @@ pub fn bake(
     }
     let outer = outer_air(&part, options.skin_hu, &to_skin);
     let outer_skin = skin_part(&to_skin.surface, &part, &outer, true);
-    let under = if options.thicken { unsigned(&part.grid, &outer_skin) } else { Vec::new() };
+    let under = unsigned(&part.grid, &outer_skin);
+    let under = |p: &Vec3| part.grid.sample(&under, p);
     let deep = deep(&part, options, &outer, &to_bone);
     progress("bones", 0.45);
     let (map, told) = bone_map(&part, options.bone_hu, labels, &nose);
@@ -133,14 +140,14 @@ pub fn bake(
     let bins: Vec<Nearest> = bone_surfaces.iter().map(|s| Nearest::new(s, 4e-3)).collect();
     let within = |reach: f64| bins.iter().map(move |b| move |p: &Vec3| b.distance(p, reach).map_or(reach, |d| d.0));
     let to: Vec<_> = within(REACH).collect();
-    // Names only ask whether a second bone is nearer than an edge.
-    let near: Vec<_> = within(2.0 * options.edge).collect();
+    // Names only ask whether a second bone is nearer than an edge, or than the crowns of the teeth.
+    let near: Vec<_> = within(NEAR.max(2.0 * options.edge)).collect();
     progress("tetrahedra", 0.55);
     let skin = Isosurface { volume: &part, iso: options.skin_hu, distance: &to_skin };
     let bone = Isosurface { volume: &part, iso: options.bone_hu, distance: &to_bone };
     let receded = |p: &Vec3| {
         let d = bone.at(p);
-        if options.thicken { d.max(THICK * options.edge - part.grid.sample(&under, p)) } else { d }
+        if options.thicken { d.max(THICK * options.edge - under(p)) } else { d }
     };
     let walls = [
         Wall { name: SKIN, field: &skin, side: Side::Inside },
@@ -155,8 +162,10 @@ pub fn bake(
     let mouth = mouth(options, &bone_surfaces, &nose, told);
     let parts = |c: [Vec3; 3], a: Vec3, b: Vec3| {
         let side = |p: &Vec3| to[1](p) < to[0](p);
-        mouth.is_some_and(|m| m.at(&((c[0] + c[1] + c[2]) / 3.0)) < 0.0) && side(&a) != side(&b)
+        let middle = (c[0] + c[1] + c[2]) / 3.0;
+        mouth.is_some_and(|m| m.parts(&middle, [&to[0], &to[1]], &under)) && side(&a) != side(&b)
     };
+    let apart = |p: &Vec3| mouth.map_or(options.edge, |m| m.apart(p, options.edge));
     let present: Vec<usize> = (0..BONES.len()).filter(|&k| !bone_surfaces[k].triangles.is_empty()).collect();
     let bones: Vec<Bone> = present.iter().map(|&k| Bone { name: BONES[k], field: &near[k] }).collect();
     let naming = Naming {
@@ -164,6 +173,7 @@ pub fn bake(
         kinds: &[Kind::Skin, Kind::Bone, Kind::Cut, Kind::Cut],
         bones: &bones,
         edge: options.edge,
+        apart: &apart,
         slit: mouth.is_some().then_some(&parts),
         is_outer: &|p| outer[part.grid.index(part.grid.nearest(p))],
     };
@@ -197,7 +207,8 @@ pub fn bake(
     warnings.extend(layers.iter().filter(coarse).cloned().map(Warning::Layer));
     progress("done", 1.0);
     let condyles = if told { condyles(&bone_surfaces[1], &nose) } else { None };
-    Ok(Baked { mesh, report, warnings, layers, condyles, slit_nodes, released_nodes })
+    let mouth = mouth.map(|m| [m.lips.low, m.lips.high]);
+    Ok(Baked { mesh, report, warnings, layers, condyles, mouth, slit_nodes, released_nodes })
 }
 
 /// Whether the labels lie where the region is.

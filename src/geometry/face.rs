@@ -1,13 +1,20 @@
 //! Where things are in a head: the tip of the nose, the region of interest, the condyles, the mouth.
 
 use super::clean::components;
-use super::{BakeOptions, Cuboid, MeshingError, Surface, Volume};
+use super::{BakeOptions, Cuboid, Field, MeshingError, Surface, Volume};
 use crate::math::Vec3;
 
 /// The face about the nose tip, m: to the right, in front, below; to the left, behind, above.
 const FACE: [[f64; 3]; 2] = [[-0.086, -0.006, -0.096], [0.086, 0.122, 0.082]];
 /// Half width and half height of the mouth, and how far behind the front of the teeth the slit may reach, m.
 const MOUTH: [f64; 3] = [0.025, 0.018, 0.010];
+/// How far the rows of teeth reach beyond the mouth's box to the sides and to the back, and half the height of both
+/// crowns, m.
+const BITE: [f64; 3] = [0.030, 0.055, 0.012];
+/// In the bite, tissue nearer than this to both jaws lies between their teeth, m: the crowns do not hold it.
+const CROWN: f64 = 0.012;
+/// Beside the lips the slit stays this far under the skin, m: the cheeks hang together.
+const CHEEK: f64 = 0.008;
 
 pub(super) fn empty(name: &'static str, iso: f64, volume: &Volume) -> MeshingError {
     let (least, most) = volume.range();
@@ -52,13 +59,41 @@ pub(super) fn condyles(mandible: &Surface, nose: &Vec3) -> Option<[Vec3; 2]> {
     Some([top(false)?, top(true)?])
 }
 
-/// The box of the mouth: given, or about the front teeth, where skull and mandible come nearest near the median plane.
-pub(super) fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, told: bool) -> Option<Cuboid> {
+/// Where the jaws part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Mouth {
+    /// Box about the lips, from commissure to commissure and from the skin to the front teeth: the slit parts all of it.
+    pub lips: Cuboid,
+    /// Box about the rows of teeth: in it the slit parts what lies between them, and their crowns hold nothing.
+    bite: Cuboid,
+}
+
+impl Mouth {
+    fn of(lips: Cuboid) -> Self {
+        let z = 0.5 * (lips.low.z + lips.high.z);
+        let low = Vec3::new(lips.low.x - BITE[0], lips.low.y, z - BITE[2]);
+        Self { lips, bite: Cuboid { low, high: Vec3::new(lips.high.x + BITE[0], lips.high.y + BITE[1], z + BITE[2]) } }
+    }
+
+    /// Whether the slit may run through a point, by the distances from skull and mandible and the depth under the skin.
+    pub fn parts(&self, p: &Vec3, to: [&dyn Field; 2], depth: &dyn Field) -> bool {
+        let between = || depth.at(p) > CHEEK && to.iter().all(|d| d.at(p) < CROWN);
+        self.lips.at(p) < 0.0 || self.bite.at(p) < 0.0 && between()
+    }
+
+    /// How near a second bone may be to a point that a bone holds, m; `edge` outside the bite.
+    pub fn apart(&self, p: &Vec3, edge: f64) -> f64 {
+        if self.bite.at(p) < 0.0 { edge.max(CROWN) } else { edge }
+    }
+}
+
+/// The mouth: its box given, or about the front teeth, where skull and mandible come nearest near the median plane.
+pub(super) fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, told: bool) -> Option<Mouth> {
     if !options.slit || !told {
         return None;
     }
     if let Some([a, b]) = options.mouth {
-        return Some(Cuboid { low: a.inf(&b), high: a.sup(&b) });
+        return Some(Mouth::of(Cuboid { low: a.inf(&b), high: a.sup(&b) }));
     }
     let near = |p: &&Vec3| (p.x - nose.x).abs() < 0.012 && p.z < nose.z - 0.012 && p.z > nose.z - 0.085;
     let front = |s: &Surface| s.vertices.iter().filter(near).map(|p| p.y).fold(f64::INFINITY, f64::min);
@@ -74,5 +109,5 @@ pub(super) fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, to
     }
     let back = upper_y.max(lower_y) + MOUTH[2];
     let low = Vec3::new(nose.x - MOUTH[0], nose.y - 0.02, z - MOUTH[1]);
-    Some(Cuboid { low, high: Vec3::new(nose.x + MOUTH[0], back, z + MOUTH[1]) })
+    Some(Mouth::of(Cuboid { low, high: Vec3::new(nose.x + MOUTH[0], back, z + MOUTH[1]) }))
 }
