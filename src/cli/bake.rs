@@ -75,6 +75,11 @@ impl Bake {
             baked.slit_nodes,
             baked.released_nodes
         );
+        if let Some([right, left]) = baked.condyles {
+            let p = 0.5 * (right + left);
+            println!("jaw: the line for [[bone]] mandible, between the condyles:");
+            println!("pivot = [{:.4}, {:.4}, {:.4}]", p.x, p.y, p.z);
+        }
         io::write_mesh(&self.out, &baked.mesh)?;
         say!("wrote {}", self.out.display());
         Ok(())

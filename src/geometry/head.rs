@@ -151,6 +151,7 @@ impl Head {
             kinds: &[Kind::Skin, Kind::Bone, Kind::Bone, Kind::Free, Kind::Cut],
             bones: &[Bone { name: "skull", field: &skull }, Bone { name: "mandible", field: &mandible }],
             edge: self.edge,
+            apart: &|_| self.edge,
             slit: Some(&in_slit),
             is_outer: &|_| true,
         };
