@@ -84,7 +84,7 @@ pub struct Baked {
     pub warnings: Vec<Warning>,
     /// Share of the volume of each layer.
     pub layers: Vec<LayerShare>,
-    /// Tops of the right and the left condyle, LPS, m: the jaw opens about the line through them.
+    /// Heads of the right and the left condyle, LPS, m: the jaw opens about the line through them.
     pub condyles: Option<[Vec3; 2]>,
     /// Box in which the lips were parted, corners in LPS metres.
     pub mouth: Option<[Vec3; 2]>,

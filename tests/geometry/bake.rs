@@ -100,7 +100,7 @@ fn clean_head_with_labels_in_release() {
     let at = |i: f64, j: f64, k: f64| volume.grid.world(&nalgebra::Vector3::new(i, j, k));
     let [right, left] = baked.condyles.unwrap();
     println!("condyles {:.1?} {:.1?} mm", (right * 1e3).as_slice(), (left * 1e3).as_slice());
-    assert!((right - at(51.0, 111.0, 49.0)).norm() < 0.012 && (left - at(157.0, 116.0, 51.0)).norm() < 0.012);
+    assert!((right - at(51.0, 111.0, 49.0)).norm() < 0.006 && (left - at(157.0, 116.0, 51.0)).norm() < 0.006);
     assert!(!baked.warnings.contains(&Warning::JawNotFound));
 }
 
