@@ -181,7 +181,7 @@ impl TetMesh {
         order.sort_unstable_by_key(|&f| (faces[f as usize].0, f));
         let same = |p: usize, q: usize| faces[order[p] as usize].0 == faces[order[q] as usize].0;
         let mut single: Vec<u32> = (0..order.len())
-            .filter(|&k| !(k > 0 && same(k - 1, k)) && !(k + 1 < order.len() && same(k, k + 1)))
+            .filter(|&k| !(k > 0 && same(k - 1, k) || k + 1 < order.len() && same(k, k + 1)))
             .map(|k| order[k])
             .collect();
         single.sort_unstable();

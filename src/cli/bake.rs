@@ -72,8 +72,14 @@ impl Bake {
         }
         say!(
             "slit: {} nodes doubled; {} bone nodes released between two bones",
-            baked.slit_nodes, baked.released_nodes
+            baked.slit_nodes,
+            baked.released_nodes
         );
+        if let Some([right, left]) = baked.condyles {
+            let p = 0.5 * (right + left);
+            println!("jaw: the line for [[bone]] mandible, between the condyles:");
+            println!("pivot = [{:.4}, {:.4}, {:.4}]", p.x, p.y, p.z);
+        }
         io::write_mesh(&self.out, &baked.mesh)?;
         say!("wrote {}", self.out.display());
         Ok(())

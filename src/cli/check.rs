@@ -29,14 +29,7 @@ impl Check {
         }
         say!("{:>6}  {:<28} {:<12} {:<6} direction", "ref", "variable", "shape", "unit");
         for p in model.ports() {
-            say!(
-                "{:>6}  {:<28} {:<12} {:<6} {:?}",
-                p.reference,
-                p.name,
-                format!("{:?}", p.shape),
-                p.unit,
-                p.causality
-            );
+            say!("{:>6}  {:<28} {:<12} {:<6} {:?}", p.reference, p.name, format!("{:?}", p.shape), p.unit, p.causality);
         }
         for warning in model.warnings() {
             say!("warning: {warning}");

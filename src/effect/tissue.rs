@@ -36,6 +36,11 @@ impl Elements<'_> {
     }
 }
 
+/// Makes a term of elements, given the constants of a law.
+type MakeTerm = fn(&[Vec<f64>], Elements) -> Box<dyn Term>;
+/// The same for a viscous overstress.
+type MakeOverstress = fn(&[Vec<f64>], Branches, Elements) -> Box<dyn Term>;
+
 /// An elastic law that a scene can choose.
 pub struct Law {
     /// Name.
@@ -45,9 +50,9 @@ pub struct Law {
     /// Lame's constants at small strain, Pa.
     pub moduli: fn(&[Vec<f64>]) -> Lame,
     /// The tissue as a term.
-    pub term: fn(&[Vec<f64>], Elements) -> Box<dyn Term>,
+    pub term: MakeTerm,
     /// Its viscous overstress as a term.
-    pub viscous: fn(&[Vec<f64>], Branches, Elements) -> Box<dyn Term>,
+    pub viscous: MakeOverstress,
 }
 
 /// A Prony series and where its memory begins.
@@ -124,7 +129,7 @@ fn veronda_westmann(c: &[Vec<f64>]) -> VerondaWestmann {
 }
 
 /// A law in Young's modulus and Poisson's ratio.
-const fn in_e_nu(name: &'static str, term: fn(&[Vec<f64>], Elements) -> Box<dyn Term>) -> Law {
+const fn in_e_nu(name: &'static str, term: MakeTerm) -> Law {
     Law { name, keys: &["E", "nu"], moduli: lame, term, viscous: viscous_neo_hookean }
 }
 

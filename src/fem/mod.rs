@@ -15,7 +15,7 @@ pub use assemble::Assembly;
 pub use dofs::{Configuration, Dofs, RigidBody, Role};
 pub use matrix::{BlockMatrix, CouplingMatrix, Pattern};
 pub use quadratic::{EDGES, add_midsides};
-pub use term::{At, Curvature, HessianSink, Kernel, OnElements, Strain, Term};
 pub use solid::{Elastic, Material, Point, Solid};
+pub use term::{At, Curvature, HessianSink, Kernel, OnElements, Strain, Term};
 pub use tet4::tet4_points;
 pub use tet10::tet10_points;

@@ -53,6 +53,8 @@ pub fn add_midsides(mesh: &mut TetMesh) -> Vec<[u32; 6]> {
                 .collect(),
         })
         .collect();
-    mesh.nodes.extend(edges.iter().map(|&(a, b)| 0.5 * (mesh.nodes[a as usize] + mesh.nodes[b as usize])).collect::<Vec<_>>());
+    mesh.nodes.extend(
+        edges.iter().map(|&(a, b)| 0.5 * (mesh.nodes[a as usize] + mesh.nodes[b as usize])).collect::<Vec<_>>(),
+    );
     midsides
 }

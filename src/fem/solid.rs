@@ -136,8 +136,8 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
             for a in 0..N {
                 for half_b in &half[a..] {
                     let block = blocks.next().expect("a block for each pair of nodes");
-                    for j in 0..3 {
-                        *block += point.dN[a][j] * half_b[j];
+                    for (dN, slab) in point.dN[a].iter().zip(half_b) {
+                        *block += *dN * slab;
                     }
                 }
             }

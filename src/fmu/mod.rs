@@ -118,6 +118,7 @@ mod tests {
             reference: 10,
             slot: Slot::BoneTranslation,
             ty: Type::Float64,
+            single: false,
             shape: vec![2, 3],
             unit: "m",
             causality: Causality::Input,

@@ -1,10 +1,10 @@
 //! From stuffed tetrahedra to a mesh that scenes can name: slit, face sets, bones, what is released.
 
 use super::Field;
-use super::repair::compact;
+use super::repair::{ROUNDS, compact, smaller_fans};
 use super::stencils::Stuffed;
 use super::stuffing::{NO_WALL, Wall};
-use super::topology::{FACES, OPEN, components, fans, neighbours, stars};
+use super::topology::{FACES, OPEN, boundary, components, fans, neighbours, pinched_edges, stars};
 use crate::math::Vec3;
 use crate::mesh::{FaceSet, NodeSet, SKIN, TetMesh};
 
@@ -36,8 +36,10 @@ pub(super) struct Naming<'a> {
     pub walls: &'a [Wall<'a>],
     pub kinds: &'a [Kind],
     pub bones: &'a [Bone<'a>],
-    /// Lattice edge, m: bone nodes nearer than this to a second bone are released.
+    /// Lattice edge, m.
     pub edge: f64,
+    /// Bone nodes nearer than this to a second bone are released, m.
+    pub apart: &'a dyn Fn(&Vec3) -> f64,
     pub slit: Option<Slit<'a>>,
     /// Whether a skin point faces the outer air; inner air is free.
     pub is_outer: &'a dyn Fn(&Vec3) -> bool,
@@ -52,9 +54,9 @@ pub(super) struct Assembled {
 
 /// Cuts the slit and names faces and nodes. Regions are left as one.
 pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
-    let (slit_faces, slit_nodes) = match naming.slit {
+    let (outer, slit_nodes) = match naming.slit {
         Some(slit) => open(&mut stuffed, slit),
-        None => (Vec::new(), 0),
+        None => (vec![[true; 4]; stuffed.tets.len()], 0),
     };
     let adjacent = neighbours(&stuffed.tets);
     let (bone_of, released_nodes) = bones(&stuffed, naming);
@@ -66,11 +68,8 @@ pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
     for (e, tet) in stuffed.tets.iter().enumerate() {
         for f in (0..4).filter(|&f| adjacent[e][f] == OPEN) {
             let t = FACES[f].map(|a| tet[a]);
-            let mut key = t;
-            key.sort_unstable();
-            let in_slit = slit_faces.binary_search(&key).is_ok();
             let set = match kind(&stuffed, t, naming) {
-                _ if in_slit => free,
+                _ if !outer[e][f] => free,
                 Kind::Skin if (naming.is_outer)(&middle(&stuffed, &t)) => 0,
                 Kind::Bone => match t.map(|a| bone_of[a as usize]) {
                     [Some(a), Some(b), Some(c)] if a == b && b == c => 1 + a,
@@ -132,7 +131,7 @@ fn bones(stuffed: &Stuffed, naming: &Naming) -> (Vec<Option<usize>>, usize) {
         let mut near: Vec<(f64, usize)> =
             naming.bones.iter().enumerate().map(|(k, b)| (b.field.at(x).abs(), k)).collect();
         near.sort_by(|p, q| p.0.total_cmp(&q.0));
-        if near.len() > 1 && near[1].0 < naming.edge {
+        if near.len() > 1 && near[1].0 < (naming.apart)(x) {
             released += 1;
             return None;
         }
@@ -142,38 +141,40 @@ fn bones(stuffed: &Stuffed, naming: &Naming) -> (Vec<Option<usize>>, usize) {
     (held, released)
 }
 
-/// Parts the tetrahedra along the slit's faces, and drops what the slit cuts off. Returns the slit's faces on both sides
-/// by their sorted nodes, sorted, and the number of nodes doubled.
-fn open(stuffed: &mut Stuffed, slit: Slit) -> (Vec<[u32; 3]>, usize) {
+/// Parts the tetrahedra along the slit's faces, and drops what the slit cuts off or pinches. Returns for each tetrahedron
+/// which of its faces were boundary before, and the number of nodes doubled.
+fn open(stuffed: &mut Stuffed, slit: Slit) -> (Vec<[bool; 4]>, usize) {
     let mut adjacent = neighbours(&stuffed.tets);
-    let faces = slit_faces(stuffed, &adjacent, slit);
-    let mut touched = vec![false; stuffed.nodes.len()];
-    for &[e, f, other, back] in &faces {
+    let mut outer: Vec<[bool; 4]> = adjacent.iter().map(|a| a.map(|other| other == OPEN)).collect();
+    for [e, f, other, back] in slit_faces(stuffed, &adjacent, slit) {
         adjacent[e][f] = OPEN;
         adjacent[other][back] = OPEN;
-        FACES[f].iter().for_each(|&a| touched[stuffed.tets[e][a] as usize] = true);
     }
-    double_nodes(stuffed, &adjacent, &touched);
-    let side = |e: usize, f: usize| {
-        let mut t = FACES[f].map(|a| stuffed.tets[e][a]);
-        t.sort_unstable();
-        t
-    };
-    // A face whose corners all hang together round its rim stays closed.
-    let opened = faces.iter().map(|&[e, f, other, back]| [side(e, f), side(other, back)]).filter(|[p, q]| p != q);
-    let mut opened: Vec<[u32; 3]> = opened.flatten().collect();
-    let new = keep_largest(stuffed);
-    opened.iter_mut().for_each(|t| {
-        *t = t.map(|a| new[a as usize]);
-        t.sort_unstable();
-    });
-    opened.retain(|t| !t.contains(&OPEN));
-    opened.sort_unstable();
+    for _ in 0..ROUNDS {
+        double_nodes(stuffed, &adjacent);
+        // A face whose corners all hang together round its rim stays closed.
+        adjacent = neighbours(&stuffed.tets);
+        let edges = pinched_edges(&boundary(&stuffed.tets, &adjacent));
+        if edges.is_empty() {
+            break;
+        }
+        let gone = smaller_fans(stuffed, &edges, &adjacent);
+        retain(stuffed, &mut outer, |e| !gone[e]);
+        adjacent = neighbours(&stuffed.tets);
+    }
+    keep_largest(stuffed, &mut outer);
     let mut places: Vec<[u64; 3]> =
         stuffed.nodes.iter().map(|x| [x.x, x.y, x.z].map(|c| (c + 0.0).to_bits())).collect();
     places.sort_unstable();
     let doubled = places.windows(2).filter(|w| w[0] == w[1]).count();
-    (opened, doubled)
+    (outer, doubled)
+}
+
+fn retain(stuffed: &mut Stuffed, outer: &mut Vec<[bool; 4]>, keep: impl Fn(usize) -> bool) {
+    let mut at = 0..stuffed.tets.len();
+    stuffed.tets.retain(|_| at.next().is_some_and(&keep));
+    let mut at = 0..outer.len();
+    outer.retain(|_| at.next().is_some_and(&keep));
 }
 
 /// Faces of the slit: tetrahedron, face, and the same from the other side.
@@ -197,10 +198,12 @@ fn slit_faces(stuffed: &Stuffed, adjacent: &[[u32; 4]], slit: Slit) -> Vec<[usiz
     faces
 }
 
-/// Gives every fan of tetrahedra round a touched node a node of its own.
-fn double_nodes(stuffed: &mut Stuffed, adjacent: &[[u32; 4]], touched: &[bool]) {
+/// Gives every fan of tetrahedra round a boundary node a node of its own.
+fn double_nodes(stuffed: &mut Stuffed, adjacent: &[[u32; 4]]) {
     let n_nodes = stuffed.nodes.len();
-    let (begin, items) = stars(&stuffed.tets, n_nodes, touched);
+    let mut touched = vec![false; n_nodes];
+    boundary(&stuffed.tets, adjacent).iter().for_each(|(t, _)| t.iter().for_each(|&a| touched[a as usize] = true));
+    let (begin, items) = stars(&stuffed.tets, n_nodes, &touched);
     let mut edits = Vec::new();
     for node in (0..n_nodes).filter(|&a| touched[a]) {
         let star = &items[begin[node] as usize..begin[node + 1] as usize];
@@ -217,13 +220,12 @@ fn double_nodes(stuffed: &mut Stuffed, adjacent: &[[u32; 4]], touched: &[bool]) 
     }
 }
 
-/// Drops all but the largest component; returns the new number of each node.
-fn keep_largest(stuffed: &mut Stuffed) -> Vec<u32> {
+/// Drops all but the largest component.
+fn keep_largest(stuffed: &mut Stuffed, outer: &mut Vec<[bool; 4]>) {
     let (component, n) = components(&neighbours(&stuffed.tets));
     let mut sizes = vec![0usize; n];
     component.iter().for_each(|&c| sizes[c as usize] += 1);
     let keep = (0..n).max_by_key(|&c| (sizes[c], n - c)).unwrap_or(0) as u32;
-    let mut component = component.into_iter();
-    stuffed.tets.retain(|_| component.next() == Some(keep));
-    compact(stuffed)
+    retain(stuffed, outer, |e| component[e] == keep);
+    compact(stuffed);
 }

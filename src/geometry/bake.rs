@@ -1,8 +1,9 @@
 //! From a head CT to a mesh of the face: region, surfaces, bones, tetrahedra, slit, layers, and what to beware of.
 
 use super::assemble::{Assembled, Bone, Kind, Naming, assemble};
-use super::clean::{crop, flood, one_body, outer_air, solid_bones};
+use super::clean::{crop, flood, one_body, outer_air, soften_islands, solid_bones};
 use super::distance::{travel, unsigned};
+use super::face::{condyles, empty, mouth, nose_tip, region};
 use super::label::{LayerShare, Layers};
 use super::separate::{BONES, bone_map};
 use super::stuffing::{Side, Wall};
@@ -14,8 +15,6 @@ use super::{
 use crate::math::Vec3;
 use crate::mesh::{SKIN, TetMesh};
 
-/// The face about the nose tip, m: to the right, in front, below; to the left, behind, above.
-const FACE: [[f64; 3]; 2] = [[-0.086, -0.006, -0.096], [0.086, 0.122, 0.082]];
 /// What is read round the region of interest, m, so that distances at its rim are right.
 const MARGIN: f64 = 0.010;
 /// Rim of the region left out of the distances reported, m: there the lattice meets the cut planes.
@@ -24,12 +23,13 @@ const RIM: f64 = 0.005;
 const THICK: f64 = 1.7;
 /// Hounsfield units below which tissue under the skin is fat.
 const FAT_HU: f64 = -10.0;
-/// Half width and half height of the mouth, and how far behind the front of the teeth the slit may reach, m.
-const MOUTH: [f64; 3] = [0.025, 0.018, 0.010];
 /// Ways into the depth pass bone at this distance at least, m: not through the thin roof of an orbit into the brain.
 const PASSAGE: f64 = 3e-3;
 /// Search reach for the nearest bone, m.
 const REACH: f64 = 0.06;
+
+/// Search reach for a second bone, m: beyond the crowns of the teeth.
+const NEAR: f64 = 0.013;
 
 /// How to bake.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,8 +84,10 @@ pub struct Baked {
     pub warnings: Vec<Warning>,
     /// Share of the volume of each layer.
     pub layers: Vec<LayerShare>,
-    /// Tops of the right and the left condyle, LPS, m: the jaw opens about the line through them.
+    /// Heads of the right and the left condyle, LPS, m: the jaw opens about the line through them.
     pub condyles: Option<[Vec3; 2]>,
+    /// Box in which the lips were parted, corners in LPS metres.
+    pub mouth: Option<[Vec3; 2]>,
     /// Nodes doubled along the oral slit.
     pub slit_nodes: usize,
     /// Bone nodes released because a second bone is near.
@@ -116,6 +118,7 @@ pub fn bake(
     let mut part = part_of(volume, &region);
     progress("surfaces", 0.05);
     one_body(&mut part, options.skin_hu);
+    soften_islands(&mut part, options.bone_hu);
     let first = Distance::to_isosurface(&part, options.bone_hu);
     if first.surface.triangles.is_empty() {
         return Err(empty("bone", options.bone_hu, &part));
@@ -128,7 +131,8 @@ pub fn bake(
     }
     let outer = outer_air(&part, options.skin_hu, &to_skin);
     let outer_skin = skin_part(&to_skin.surface, &part, &outer, true);
-    let under = if options.thicken { unsigned(&part.grid, &outer_skin) } else { Vec::new() };
+    let under = unsigned(&part.grid, &outer_skin);
+    let under = |p: &Vec3| part.grid.sample(&under, p);
     let deep = deep(&part, options, &outer, &to_bone);
     progress("bones", 0.45);
     let (map, told) = bone_map(&part, options.bone_hu, labels, &nose);
@@ -136,14 +140,14 @@ pub fn bake(
     let bins: Vec<Nearest> = bone_surfaces.iter().map(|s| Nearest::new(s, 4e-3)).collect();
     let within = |reach: f64| bins.iter().map(move |b| move |p: &Vec3| b.distance(p, reach).map_or(reach, |d| d.0));
     let to: Vec<_> = within(REACH).collect();
-    // Names only ask whether a second bone is nearer than an edge.
-    let near: Vec<_> = within(2.0 * options.edge).collect();
+    // Names only ask whether a second bone is nearer than an edge, or than the crowns of the teeth.
+    let near: Vec<_> = within(NEAR.max(2.0 * options.edge)).collect();
     progress("tetrahedra", 0.55);
     let skin = Isosurface { volume: &part, iso: options.skin_hu, distance: &to_skin };
     let bone = Isosurface { volume: &part, iso: options.bone_hu, distance: &to_bone };
     let receded = |p: &Vec3| {
         let d = bone.at(p);
-        if options.thicken { d.max(THICK * options.edge - part.grid.sample(&under, p)) } else { d }
+        if options.thicken { d.max(THICK * options.edge - under(p)) } else { d }
     };
     let walls = [
         Wall { name: SKIN, field: &skin, side: Side::Inside },
@@ -158,8 +162,10 @@ pub fn bake(
     let mouth = mouth(options, &bone_surfaces, &nose, told);
     let parts = |c: [Vec3; 3], a: Vec3, b: Vec3| {
         let side = |p: &Vec3| to[1](p) < to[0](p);
-        mouth.is_some_and(|m| m.at(&((c[0] + c[1] + c[2]) / 3.0)) < 0.0) && side(&a) != side(&b)
+        let middle = (c[0] + c[1] + c[2]) / 3.0;
+        mouth.is_some_and(|m| m.parts(&middle, [&to[0], &to[1]], &under)) && side(&a) != side(&b)
     };
+    let apart = |p: &Vec3| mouth.map_or(options.edge, |m| m.apart(p, options.edge));
     let present: Vec<usize> = (0..BONES.len()).filter(|&k| !bone_surfaces[k].triangles.is_empty()).collect();
     let bones: Vec<Bone> = present.iter().map(|&k| Bone { name: BONES[k], field: &near[k] }).collect();
     let naming = Naming {
@@ -167,6 +173,7 @@ pub fn bake(
         kinds: &[Kind::Skin, Kind::Bone, Kind::Cut, Kind::Cut],
         bones: &bones,
         edge: options.edge,
+        apart: &apart,
         slit: mouth.is_some().then_some(&parts),
         is_outer: &|p| outer[part.grid.index(part.grid.nearest(p))],
     };
@@ -200,38 +207,8 @@ pub fn bake(
     warnings.extend(layers.iter().filter(coarse).cloned().map(Warning::Layer));
     progress("done", 1.0);
     let condyles = if told { condyles(&bone_surfaces[1], &nose) } else { None };
-    Ok(Baked { mesh, report, warnings, layers, condyles, slit_nodes, released_nodes })
-}
-
-fn empty(name: &'static str, iso: f64, volume: &Volume) -> MeshingError {
-    let (least, most) = volume.range();
-    MeshingError::EmptyIsosurface { name, iso, least: f64::from(least), most: f64::from(most) }
-}
-
-/// The foremost skin point of the volume: the tip of the nose, if the face is in it.
-fn nose_tip(volume: &Volume, options: &BakeOptions) -> Result<Vec3, MeshingError> {
-    let grid = &volume.grid;
-    let [nx, ny, _] = grid.dims;
-    let (number, sizes) = super::clean::components(grid, |at| f64::from(volume.samples[at]) >= options.skin_hu);
-    let largest = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k));
-    let Some(largest) = largest.filter(|&k| sizes[k] < grid.len()) else {
-        return Err(empty("skin", options.skin_hu, volume));
-    };
-    let body = (0..grid.len()).filter(|&at| number[at] as usize == largest + 1);
-    let place = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
-    let foremost = body.map(place).min_by(|p, q| p.y.total_cmp(&q.y));
-    foremost.ok_or_else(|| empty("skin", options.skin_hu, volume))
-}
-
-/// The region of interest, inside the volume.
-fn region(volume: &Volume, options: &BakeOptions, nose: &Vec3) -> Result<Cuboid, MeshingError> {
-    let [low, high] = volume.grid.bounds();
-    let [from, to] = options.roi.unwrap_or(FACE.map(|c| nose + Vec3::from(c)));
-    let region = Cuboid { low: from.inf(&to).sup(&low), high: from.sup(&to).inf(&high) };
-    if (region.high - region.low).min() < 2.0 * options.edge {
-        return Err(MeshingError::Region { region: [from.into(), to.into()], volume: [low.into(), high.into()] });
-    }
-    Ok(region)
+    let mouth = mouth.map(|m| [m.lips.low, m.lips.high]);
+    Ok(Baked { mesh, report, warnings, layers, condyles, mouth, slit_nodes, released_nodes })
 }
 
 /// Whether the labels lie where the region is.
@@ -316,43 +293,6 @@ fn compacted(surface: &Surface, mut triangles: Vec<[u32; 3]>) -> Surface {
 fn skin_part(surface: &Surface, part: &Volume, outer: &[bool], wanted: bool) -> Surface {
     let is_outer = |t: &[u32; 3]| outer[part.grid.index(part.grid.nearest(&surface.vertices[t[0] as usize]))];
     compacted(surface, surface.triangles.iter().filter(|t| is_outer(t) == wanted).copied().collect())
-}
-
-/// The highest points of the mandible's back third on both sides of the nose's plane.
-fn condyles(mandible: &Surface, nose: &Vec3) -> Option<[Vec3; 2]> {
-    let y = mandible.vertices.iter().map(|p| p.y);
-    let (front, back) = (y.clone().fold(f64::INFINITY, f64::min), y.fold(f64::NEG_INFINITY, f64::max));
-    let behind = front + (back - front) * 2.0 / 3.0;
-    let top = |left: bool| {
-        let side = mandible.vertices.iter().filter(|p| (p.x > nose.x) == left && p.y > behind);
-        side.max_by(|p, q| p.z.total_cmp(&q.z)).copied()
-    };
-    Some([top(false)?, top(true)?])
-}
-
-/// The box of the mouth: given, or about the front teeth, where skull and mandible come nearest near the median plane.
-fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, told: bool) -> Option<Cuboid> {
-    if !options.slit || !told {
-        return None;
-    }
-    if let Some([a, b]) = options.mouth {
-        return Some(Cuboid { low: a.inf(&b), high: a.sup(&b) });
-    }
-    let near = |p: &&Vec3| (p.x - nose.x).abs() < 0.012 && p.z < nose.z - 0.012 && p.z > nose.z - 0.085;
-    let front = |s: &Surface| s.vertices.iter().filter(near).map(|p| p.y).fold(f64::INFINITY, f64::min);
-    let teeth = |s: &Surface, y: f64| {
-        s.vertices.iter().filter(near).filter(|p| p.y < y + 0.012).map(|p| p.z).collect::<Vec<_>>()
-    };
-    let (upper_y, lower_y) = (front(&bones[0]), front(&bones[1]));
-    let upper = teeth(&bones[0], upper_y).into_iter().fold(f64::INFINITY, f64::min);
-    let lower = teeth(&bones[1], lower_y).into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let z = 0.5 * (upper + lower);
-    if !z.is_finite() {
-        return None;
-    }
-    let back = upper_y.max(lower_y) + MOUTH[2];
-    let low = Vec3::new(nose.x - MOUTH[0], nose.y - 0.02, z - MOUTH[1]);
-    Some(Cuboid { low, high: Vec3::new(nose.x + MOUTH[0], back, z + MOUTH[1]) })
 }
 
 /// Samples of tissue that hang together with the outer skin, inside the region and not too deep.

@@ -5,6 +5,11 @@ use crate::math::Vec3;
 
 /// Air, HU: what lies outside the body is set to it.
 const AIR: f32 = -1000.0;
+/// Bone pieces smaller than this that touch nothing, m3, are streaks of fillings, calcifications, splinters of turbinates:
+/// soft tissue. A hyoid has 1.5 mL, a tooth stands in its jaw.
+const ISLAND: f64 = 0.5e-6;
+/// Soft tissue, HU.
+const SOFT: f32 = 60.0;
 /// Passages narrower than twice this are closed when bone is filled, m: marrow behind thin cortex, the brain behind the
 /// orbits' fissures, sinuses, the joint's and the teeth's gaps.
 const BONE_REACH: f64 = 3e-3;
@@ -132,6 +137,24 @@ pub(super) fn one_body(volume: &mut Volume, iso: f64) {
             *s = AIR;
         }
     }
+}
+
+/// Makes small pieces of bone that hang on nothing soft tissue; those at the rim may go on beyond it and stay. Returns how many.
+pub(super) fn soften_islands(volume: &mut Volume, bone: f64) -> usize {
+    let grid = &volume.grid;
+    let [nx, ny, nz] = grid.dims;
+    let (number, sizes) = components(grid, |at| f64::from(volume.samples[at]) >= bone);
+    let mut small: Vec<bool> = sizes.iter().map(|&n| (n as f64) * grid.spacing.product() < ISLAND).collect();
+    let at_rim = |at: usize| {
+        let c = [(at % nx, nx), (at / nx % ny, ny), (at / (nx * ny), nz)];
+        c.iter().any(|&(c, n)| c == 0 || c + 1 == n)
+    };
+    (0..number.len()).filter(|&at| number[at] != 0 && at_rim(at)).for_each(|at| small[number[at] as usize - 1] = false);
+    let soft = SOFT.min(bone as f32 - 1.0);
+    for (s, _) in volume.samples.iter_mut().zip(&number).filter(|(_, n)| **n != 0 && small[**n as usize - 1]) {
+        *s = soft;
+    }
+    small.iter().filter(|s| **s).count()
 }
 
 /// Fills marrow, sinuses, the skull's inside and whatever else only narrow passages lead to with bone. Returns the number of samples filled.

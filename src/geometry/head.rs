@@ -55,6 +55,8 @@ pub fn skin(p: &Vec3) -> f64 {
     d = join(d, ellipsoid(&p, [0.0, -0.034, -0.015], [0.062, 0.059, 0.046]), 0.020);
     d = join(d, ellipsoid(&p, [0.0, 0.006, 0.020], [0.071, 0.050, 0.070]), 0.020);
     d = join(d, rod(&p, [0.0, 0.010, -0.02], [0.0, 0.020, -0.15], 0.056), 0.020);
+    // The gland before the ear, over the joint and the arch.
+    d = join(d, ellipsoid(&p, [0.046, 0.002, 0.028], [0.024, 0.034, 0.046]), 0.014);
     d = join(d, ellipsoid(&p, [0.0, -0.082, -0.036], [0.022, 0.017, 0.016]), 0.016);
     d = join(d, ellipsoid(&p, [0.040, -0.058, 0.046], [0.024, 0.022, 0.018]), 0.016);
     d = join(d, rod(&p, [0.006, -0.086, 0.087], [0.030, -0.080, 0.091], 0.009), 0.012);
@@ -149,6 +151,7 @@ impl Head {
             kinds: &[Kind::Skin, Kind::Bone, Kind::Bone, Kind::Free, Kind::Cut],
             bones: &[Bone { name: "skull", field: &skull }, Bone { name: "mandible", field: &mandible }],
             edge: self.edge,
+            apart: &|_| self.edge,
             slit: Some(&in_slit),
             is_outer: &|_| true,
         };

@@ -10,6 +10,7 @@ mod block;
 mod clean;
 mod distance;
 mod error;
+mod face;
 mod field;
 pub mod head;
 mod label;

@@ -6,7 +6,7 @@ use crate::math::Vec3;
 use crate::mesh::signed_volume;
 
 /// Rounds of repair; each leaves fewer pinches, and two are usual.
-const ROUNDS: usize = 20;
+pub(super) const ROUNDS: usize = 20;
 /// A parted node moves this share of the way into its own piece, so that no two nodes share a place.
 const PART: f64 = 0.01;
 
@@ -34,7 +34,10 @@ pub(super) fn repair(mesh: &mut Stuffed) -> Repair {
         if edges.is_empty() {
             break;
         }
-        drop_smaller_fans(mesh, &edges, &adjacent, &mut report);
+        let gone = smaller_fans(mesh, &edges, &adjacent);
+        report.pinched_tets += gone.iter().filter(|g| **g).count();
+        let mut gone = gone.into_iter();
+        mesh.tets.retain(|_| gone.next() == Some(false));
         largest_component(mesh, &mut report);
     }
     compact(mesh);
@@ -83,8 +86,8 @@ fn part_nodes(mesh: &mut Stuffed, report: &mut Repair) {
     }
 }
 
-/// At each pinched edge all tetrahedra round it go but the largest group that hangs together there.
-fn drop_smaller_fans(mesh: &mut Stuffed, edges: &[[u32; 2]], adjacent: &[[u32; 4]], report: &mut Repair) {
+/// The tetrahedra that go: at each pinched edge all round it but the largest group that hangs together there.
+pub(super) fn smaller_fans(mesh: &Stuffed, edges: &[[u32; 2]], adjacent: &[[u32; 4]]) -> Vec<bool> {
     let mut wanted = vec![false; mesh.nodes.len()];
     edges.iter().for_each(|e| wanted[e[0] as usize] = true);
     let (begin, items) = stars(&mesh.tets, mesh.nodes.len(), &wanted);
@@ -117,9 +120,7 @@ fn drop_smaller_fans(mesh: &mut Stuffed, edges: &[[u32; 2]], adjacent: &[[u32; 4
         let keep = (0..volumes.len()).max_by(|&a, &b| volumes[a].total_cmp(&volumes[b]).then(b.cmp(&a)));
         (0..round.len()).filter(|&k| Some(group[k]) != keep).for_each(|k| gone[round[k] as usize] = true);
     }
-    report.pinched_tets += gone.iter().filter(|g| **g).count();
-    let mut gone = gone.into_iter();
-    mesh.tets.retain(|_| gone.next() == Some(false));
+    gone
 }
 
 /// Drops nodes that no tetrahedron uses; returns the new number of each node, `u32::MAX` for the dropped.

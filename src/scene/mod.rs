@@ -5,10 +5,13 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case)]
 
+mod bones;
 mod build;
 mod check;
 mod file;
 mod keys;
+mod loads;
+mod materials;
 mod place;
 mod programme;
 mod source;

@@ -1,6 +1,9 @@
 //! The programme of a scene: inputs over time, linear between keyframes.
 
-use crate::port::Port;
+use super::SceneError;
+use super::build::Builder;
+use super::file::SceneFile;
+use crate::port::{Causality, Port};
 
 /// Values over time for one row (or all) of one input port.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,5 +75,54 @@ fn sample(frames: &[(f64, Vec<f64>)], t: f64) -> Vec<f64> {
         }
         (Some((_, values)), None) | (None, Some((_, values))) => values.clone(),
         (None, None) => Vec::new(),
+    }
+}
+
+impl Builder<'_> {
+    pub(super) fn tracks(&self, file: &SceneFile, ports: &[Port]) -> Result<Vec<Track>, SceneError> {
+        let mut tracks: Vec<Track> = Vec::new();
+        for frame in &file.keyframe {
+            let inputs = || ports.iter().filter(|p| p.causality == Causality::Input);
+            let wanted = frame.port.get_ref();
+            let (port, p) = ports
+                .iter()
+                .enumerate()
+                .find(|(_, p)| p.name == *wanted && p.causality == Causality::Input)
+                .ok_or_else(|| self.text.unknown("input", &frame.port, inputs().map(|p| p.name.as_str())))?;
+            let (offset, len) = match &frame.row {
+                None => (0, p.len()),
+                Some(row) => {
+                    let width = p.len() / p.shape[0];
+                    let k = p.rows.iter().position(|r| r == row.get_ref());
+                    let k = k.ok_or_else(|| self.text.unknown("row", row, p.rows.iter().map(String::as_str)))?;
+                    (k * width, width)
+                }
+            };
+            let values = numbers(frame.value.get_ref()).filter(|v| v.len() == len && v.iter().all(|c| c.is_finite()));
+            let values = values.ok_or_else(|| {
+                self.text.at(frame.value.span().start, format!("`value` must be {len} finite number(s) for `{wanted}`"))
+            })?;
+            let t = self.text.checked("keyframe", "t", &frame.t)?;
+            let same =
+                |track: &&mut Track| track.port == port && track.offset == offset && track.frames[0].1.len() == len;
+            match tracks.iter_mut().find(same) {
+                Some(track) => track.insert(t, values),
+                None => {
+                    let mut track = Track::new(port, offset, len, p);
+                    track.insert(t, values);
+                    tracks.push(track);
+                }
+            }
+        }
+        Ok(tracks)
+    }
+}
+
+fn numbers(value: &toml::Value) -> Option<Vec<f64>> {
+    match value {
+        toml::Value::Float(v) => Some(vec![*v]),
+        toml::Value::Integer(v) => Some(vec![*v as f64]),
+        toml::Value::Array(items) => items.iter().map(numbers).collect::<Option<Vec<_>>>().map(|v| v.concat()),
+        _ => None,
     }
 }

@@ -101,7 +101,7 @@ fn rows(row: impl Fn(usize) -> Vec3, offset: usize, out: &mut [f64]) {
 
 /// The same for node positions, a whole row at a time where `out` is aligned with them.
 fn gather(nodes: &[u32], x: &[Vec3], offset: usize, out: &mut [f64]) {
-    if offset % 3 != 0 || out.len() % 3 != 0 {
+    if !(offset.is_multiple_of(3) && out.len().is_multiple_of(3)) {
         return rows(|k| x[nodes[k] as usize], offset, out);
     }
     for (row, &a) in out.chunks_exact_mut(3).zip(&nodes[offset / 3..]) {

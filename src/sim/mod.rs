@@ -40,10 +40,10 @@ pub enum SimError {
     #[error(transparent)]
     Setup(#[from] SolveError),
     /// The step length is no positive number.
-    #[error("a step must be a positive, finite number of seconds; found {0}")]
+    #[error("a step must be a positive, finite number of seconds; found {0:?}")]
     StepLength(f64),
     /// An input is NaN or infinite.
-    #[error("input `{name}` is {value}; every input must be a finite number")]
+    #[error("input `{name}` is {value:?}; every input must be a finite number")]
     NotFinite {
         /// Port and element, 1-based: `bone.translation[2,1]`.
         name: String,
@@ -52,7 +52,7 @@ pub enum SimError {
     },
     /// An input moves or pushes a bone that is not driven that way.
     #[error(
-        "input `{name}` is {value}, but bone `{bone}` is {drive}: it takes no such input; change its `drive` in the scene"
+        "input `{name}` is {value:?}, but bone `{bone}` is {drive}: it takes no such input; change its `drive` in the scene"
     )]
     NotDriven {
         /// Port and element, 1-based.

@@ -122,12 +122,16 @@ impl Minimiser {
     /// Factors the stiffness at `config`; the true one where it is positive definite, else the projected one.
     ///
     /// # Errors
-    /// [`SolveError::Singular`] if even the projected stiffness is not positive definite.
+    /// [`SolveError::Singular`] if even the projected stiffness is not positive definite, [`SolveError::NotFinite`] where
+    /// the energy is not defined.
     pub fn linearise(&mut self, problem: &Problem, config: &Configuration) -> Result<(), SolveError> {
         self.lag.copy_from(config);
         self.factored_at.copy_from(config);
-        problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
+        let energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
         self.factored = false;
+        if !energy.is_finite() {
+            return Err(SolveError::NotFinite);
+        }
         self.frame = Mat3::identity();
         self.memory.forget();
         for curvature in [Curvature::Exact, Curvature::Projected] {

@@ -43,7 +43,7 @@ pub enum SolveError {
         n_blocks: usize,
     },
     /// The energy is not finite where the step starts.
-    #[error("the energy is not finite where the step starts: the bones move further than the tissue can follow")]
+    #[error("the energy is not finite where the step starts: elements are inverted that the law does not allow to be, or the bones move further than the tissue can follow")]
     NotFinite,
     /// The factor would not fit a common machine's memory.
     #[error(
@@ -67,7 +67,9 @@ impl SolveError {
     pub fn iterations(&self) -> u32 {
         match self {
             SolveError::NotConverged { iterations, .. } => *iterations,
-            SolveError::Singular { .. } | SolveError::NotFinite | SolveError::Inverts | SolveError::TooLarge { .. } => 1,
+            SolveError::Singular { .. } | SolveError::NotFinite | SolveError::Inverts | SolveError::TooLarge { .. } => {
+                1
+            }
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Violent motion ends in an equilibrium or in a clear error, never in a NaN, and the way back leads to rest.
 
+use std::f64::consts::FRAC_PI_2;
+
 use cutis::effect::LAWS;
 
 use super::inputs::block;
@@ -14,7 +16,7 @@ fn huge_motion_and_force_end_in_an_answer_or_an_error() {
             ("bone.translation", vec![0.0, 0.0, 0.0, 0.0, 0.05, 0.05]),
             ("bone.translation", vec![0.0, 0.0, 0.0, -0.05, 0.0, 0.0]),
             ("bone.translation", vec![0.0, 0.0, 0.0, 1e6, 0.0, 0.0]),
-            ("bone.rotation", vec![0.0, 0.0, 0.0, 1.5708, 0.0, 0.0]),
+            ("bone.rotation", vec![0.0, 0.0, 0.0, FRAC_PI_2, 0.0, 0.0]),
             ("bone.rotation", vec![0.0, 0.0, 0.0, 0.0, 0.0, 3.1]),
             ("load.force", vec![0.0, 0.0, -5.0]),
             ("load.force", vec![1e4, 0.0, 1e4]),
@@ -36,7 +38,7 @@ fn a_bone_jump_of_five_centimetres_and_a_right_angle_is_solved() {
     for energy in ["corotational", "stable-neo-hookean", "neo-hookean", "yeoh", "fung", "ogden"] {
         let mut sim = sim(&block(energy));
         set(&mut sim, "bone.translation", 3, &[0.05, 0.0, 0.0]);
-        set(&mut sim, "bone.rotation", 3, &[1.5708, 0.0, 0.0]);
+        set(&mut sim, "bone.rotation", 3, &[FRAC_PI_2, 0.0, 0.0]);
         let report = sim.step(0.1).unwrap_or_else(|e| panic!("{energy}: {e}"));
         assert!(report.min_det_f > 0.0, "{energy}: {report:?}");
     }

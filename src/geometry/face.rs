@@ -1,0 +1,117 @@
+//! Where things are in a head: the tip of the nose, the region of interest, the condyles, the mouth.
+
+use super::clean::components;
+use super::{BakeOptions, Cuboid, Field, MeshingError, Surface, Volume};
+use crate::math::Vec3;
+
+/// The face about the nose tip, m: to the right, in front, below; to the left, behind, above.
+const FACE: [[f64; 3]; 2] = [[-0.086, -0.006, -0.096], [0.086, 0.122, 0.082]];
+/// Height of a condyle's head, m.
+const CONDYLE: f64 = 0.005;
+/// Half width and half height of the mouth, and how far behind the front of the teeth the slit may reach, m.
+const MOUTH: [f64; 3] = [0.025, 0.018, 0.010];
+/// How far the rows of teeth reach beyond the mouth's box to the sides and to the back, and half the height of both
+/// crowns, m.
+const BITE: [f64; 3] = [0.030, 0.055, 0.012];
+/// In the bite, tissue nearer than this to both jaws lies between their teeth, m: the crowns do not hold it.
+const CROWN: f64 = 0.012;
+/// Beside the lips the slit stays this far under the skin, m: the cheeks hang together.
+const CHEEK: f64 = 0.008;
+
+pub(super) fn empty(name: &'static str, iso: f64, volume: &Volume) -> MeshingError {
+    let (least, most) = volume.range();
+    MeshingError::EmptyIsosurface { name, iso, least: f64::from(least), most: f64::from(most) }
+}
+
+/// The foremost skin point of the volume: the tip of the nose, if the face is in it.
+pub(super) fn nose_tip(volume: &Volume, options: &BakeOptions) -> Result<Vec3, MeshingError> {
+    let grid = &volume.grid;
+    let [nx, ny, _] = grid.dims;
+    let (number, sizes) = components(grid, |at| f64::from(volume.samples[at]) >= options.skin_hu);
+    let largest = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k));
+    let Some(largest) = largest.filter(|&k| sizes[k] < grid.len()) else {
+        return Err(empty("skin", options.skin_hu, volume));
+    };
+    let body = (0..grid.len()).filter(|&at| number[at] as usize == largest + 1);
+    let place = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
+    let foremost = body.map(place).min_by(|p, q| p.y.total_cmp(&q.y));
+    foremost.ok_or_else(|| empty("skin", options.skin_hu, volume))
+}
+
+/// The region of interest, inside the volume.
+pub(super) fn region(volume: &Volume, options: &BakeOptions, nose: &Vec3) -> Result<Cuboid, MeshingError> {
+    let [low, high] = volume.grid.bounds();
+    let [from, to] = options.roi.unwrap_or(FACE.map(|c| nose + Vec3::from(c)));
+    let region = Cuboid { low: from.inf(&to).sup(&low), high: from.sup(&to).inf(&high) };
+    if (region.high - region.low).min() < 2.0 * options.edge {
+        return Err(MeshingError::Region { region: [from.into(), to.into()], volume: [low.into(), high.into()] });
+    }
+    Ok(region)
+}
+
+/// The heads of the mandible's back third on both sides of the nose's plane: the middle of what is highest.
+pub(super) fn condyles(mandible: &Surface, nose: &Vec3) -> Option<[Vec3; 2]> {
+    let y = mandible.vertices.iter().map(|p| p.y);
+    let (front, back) = (y.clone().fold(f64::INFINITY, f64::min), y.fold(f64::NEG_INFINITY, f64::max));
+    let behind = front + (back - front) * 2.0 / 3.0;
+    let top = |left: bool| {
+        let side = || mandible.vertices.iter().filter(move |p| (p.x > nose.x) == left && p.y > behind);
+        let height = side().map(|p| p.z).max_by(f64::total_cmp)?;
+        let head: Vec<&Vec3> = side().filter(|p| p.z > height - CONDYLE).collect();
+        Some(head.iter().copied().sum::<Vec3>() / head.len() as f64)
+    };
+    Some([top(false)?, top(true)?])
+}
+
+/// Where the jaws part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Mouth {
+    /// Box about the lips, from commissure to commissure and from the skin to the front teeth: the slit parts all of it.
+    pub lips: Cuboid,
+    /// Box about the rows of teeth: in it the slit parts what lies between them, and their crowns hold nothing.
+    bite: Cuboid,
+}
+
+impl Mouth {
+    fn of(lips: Cuboid) -> Self {
+        let z = 0.5 * (lips.low.z + lips.high.z);
+        let low = Vec3::new(lips.low.x - BITE[0], lips.low.y, z - BITE[2]);
+        Self { lips, bite: Cuboid { low, high: Vec3::new(lips.high.x + BITE[0], lips.high.y + BITE[1], z + BITE[2]) } }
+    }
+
+    /// Whether the slit may run through a point, by the distances from skull and mandible and the depth under the skin.
+    pub fn parts(&self, p: &Vec3, to: [&dyn Field; 2], depth: &dyn Field) -> bool {
+        let between = || depth.at(p) > CHEEK && to.iter().all(|d| d.at(p) < CROWN);
+        self.lips.at(p) < 0.0 || self.bite.at(p) < 0.0 && between()
+    }
+
+    /// How near a second bone may be to a point that a bone holds, m; `edge` outside the bite.
+    pub fn apart(&self, p: &Vec3, edge: f64) -> f64 {
+        if self.bite.at(p) < 0.0 { edge.max(CROWN) } else { edge }
+    }
+}
+
+/// The mouth: its box given, or about the front teeth, where skull and mandible come nearest near the median plane.
+pub(super) fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, told: bool) -> Option<Mouth> {
+    if !options.slit || !told {
+        return None;
+    }
+    if let Some([a, b]) = options.mouth {
+        return Some(Mouth::of(Cuboid { low: a.inf(&b), high: a.sup(&b) }));
+    }
+    let near = |p: &&Vec3| (p.x - nose.x).abs() < 0.012 && p.z < nose.z - 0.012 && p.z > nose.z - 0.085;
+    let front = |s: &Surface| s.vertices.iter().filter(near).map(|p| p.y).fold(f64::INFINITY, f64::min);
+    let teeth = |s: &Surface, y: f64| {
+        s.vertices.iter().filter(near).filter(|p| p.y < y + 0.012).map(|p| p.z).collect::<Vec<_>>()
+    };
+    let (upper_y, lower_y) = (front(&bones[0]), front(&bones[1]));
+    let upper = teeth(&bones[0], upper_y).into_iter().fold(f64::INFINITY, f64::min);
+    let lower = teeth(&bones[1], lower_y).into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let z = 0.5 * (upper + lower);
+    if !z.is_finite() {
+        return None;
+    }
+    let back = upper_y.max(lower_y) + MOUTH[2];
+    let low = Vec3::new(nose.x - MOUTH[0], nose.y - 0.02, z - MOUTH[1]);
+    Some(Mouth::of(Cuboid { low, high: Vec3::new(nose.x + MOUTH[0], back, z + MOUTH[1]) }))
+}

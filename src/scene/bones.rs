@@ -1,0 +1,98 @@
+//! Bones: which nodes they hold, where they start, what is released between them.
+
+use super::SceneError;
+use super::build::Builder;
+use super::file::BoneSpec;
+use crate::math::Vec3;
+use crate::mesh::TetMesh;
+use crate::port::Slot;
+use crate::sim::{self, Bone, Drive, Layout};
+
+impl Builder<'_> {
+    /// Bones and their nodes. With `rings` > 0 a node that two bones claim belongs to neither.
+    pub(super) fn bones(&self, specs: &[BoneSpec], mesh: &TetMesh, rings: u32) -> Result<Vec<Bone>, SceneError> {
+        self.text.names("bone", specs.iter().map(|b| &b.name))?;
+        let mut owner: Vec<Option<&str>> = vec![None; mesh.nodes.len()];
+        let mut shared = vec![false; mesh.nodes.len()];
+        let mut bones = Vec::new();
+        for spec in specs {
+            let wanted = spec.nodes.as_ref().unwrap_or(&spec.name);
+            let set = mesh
+                .node_set(wanted.get_ref())
+                .ok_or_else(|| self.text.unknown("node set", wanted, mesh.node_sets.iter().map(|s| s.name.as_str())))?;
+            for &a in &set.nodes {
+                let Some(other) = owner[a as usize].replace(spec.name.get_ref()) else { continue };
+                shared[a as usize] = true;
+                if rings == 0 {
+                    let message = format!(
+                        "bones `{other}` and `{}` both claim node {a}; a node can stick to one bone only: name other \
+                         sets, or let [attachment] free_rings = 1 set such nodes free",
+                        spec.name.get_ref()
+                    );
+                    return Err(self.text.at(wanted.span().start, message));
+                }
+            }
+            let drive = match self.text.choice("bone", "drive", &spec.drive)?.unwrap_or("pose") {
+                "held" => Drive::Held,
+                "force" => Drive::Force,
+                "displacement" => Drive::Displacement,
+                _ => Drive::Pose,
+            };
+            bones.push(Bone { name: spec.name.get_ref().clone(), nodes: set.nodes.clone(), drive });
+        }
+        bones.iter_mut().for_each(|b| b.nodes.retain(|a| !shared[*a as usize]));
+        Ok(bones)
+    }
+
+    pub(super) fn bone_starts(
+        &self,
+        specs: &[BoneSpec],
+        bones: &[Bone],
+        mesh: &TetMesh,
+        layout: &Layout,
+        start: &mut [f64],
+    ) -> Result<(), SceneError> {
+        for (b, (spec, bone)) in specs.iter().zip(bones).enumerate() {
+            let mut put = |slot: Slot, value: Option<[f64; 3]>| {
+                if let (Some(first), Some(value)) = (layout.first(slot), value) {
+                    start[first + 3 * b..first + 3 * b + 3].copy_from_slice(&value);
+                }
+            };
+            let centroid =
+                bone.nodes.iter().map(|&a| mesh.nodes[a as usize]).sum::<Vec3>() / bone.nodes.len().max(1) as f64;
+            put(Slot::BonePivot, Some(self.text.triple("bone", "pivot", &spec.pivot)?.unwrap_or(centroid.into())));
+            for (slot, key, value, drive) in [
+                (Slot::BoneTranslation, "translation", &spec.translation, Drive::Pose),
+                (Slot::BoneRotation, "rotation", &spec.rotation, Drive::Pose),
+                (Slot::BoneForce, "force", &spec.force, Drive::Force),
+                (Slot::BoneTorque, "torque", &spec.torque, Drive::Force),
+            ] {
+                if let Some(v) = value.as_ref().filter(|_| bone.drive != drive) {
+                    return Err(self.text.at(
+                        v.span().start,
+                        format!("`{key}` is for a {drive} bone; `{}` is {}", bone.name, bone.drive),
+                    ));
+                }
+                put(slot, self.text.triple("bone", key, value)?);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Takes bone nodes within `rings` edges of another bone off their bone.
+pub(super) fn free_rings(mesh: &TetMesh, bones: &mut [Bone], rings: u32, warnings: &mut Vec<String>) {
+    let mut freed = 0;
+    for _ in 0..rings {
+        let mut near: Vec<u32> = sim::osteotomy_edges(mesh, bones).into_iter().flat_map(|(a, b)| [a, b]).collect();
+        near.sort_unstable();
+        near.dedup();
+        freed += near.len();
+        for bone in bones.iter_mut() {
+            bone.nodes.retain(|a| near.binary_search(a).is_err());
+        }
+    }
+    if freed > 0 {
+        warnings.push(format!("{freed} bone node(s) next to another bone were set free (free_rings = {rings})"));
+    }
+}

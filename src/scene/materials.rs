@@ -1,0 +1,186 @@
+//! Materials: tissues, their overstress, muscles.
+
+use super::SceneError;
+use super::build::Builder;
+use super::file::{MuscleSpec, SceneFile, TissueSpec, ViscousSpec};
+use super::keys::find;
+use crate::effect::{self, Branches, Elements, Law, Muscle, nearest_on_path};
+use crate::energy::Lame;
+use crate::fem::Term;
+use crate::math::Vec3;
+use crate::mesh::TetMesh;
+
+/// Above this Poisson's ratio linear tetrahedra lock visibly.
+const LOCKING_NU: f64 = 0.45;
+
+/// What the materials of a scene come to.
+pub(super) struct Tissue {
+    pub terms: Vec<Box<dyn Term>>,
+    /// By region, kg/m3.
+    pub density: Vec<f64>,
+    pub n_history: usize,
+}
+
+impl Builder<'_> {
+    /// One term for each material, its overstress if it has one, and the density of each region.
+    pub(super) fn tissue(
+        &self,
+        file: &SceneFile,
+        mesh: &TetMesh,
+        midsides: &[[u32; 6]],
+        warnings: &mut Vec<String>,
+    ) -> Result<Tissue, SceneError> {
+        let mut material = vec![usize::MAX; mesh.region_names.len()];
+        for (k, spec) in file.tissue.iter().enumerate() {
+            let Some(regions) = &spec.regions else {
+                material.iter_mut().filter(|m| **m == usize::MAX).for_each(|m| *m = k);
+                continue;
+            };
+            for name in regions {
+                let r = mesh.region_names.iter().position(|r| r == name.get_ref());
+                let r =
+                    r.ok_or_else(|| self.text.unknown("region", name, mesh.region_names.iter().map(String::as_str)))?;
+                if material[r] == usize::MAX {
+                    material[r] = k;
+                }
+            }
+        }
+        if let Some(r) = material.iter().position(|&m| m == usize::MAX) {
+            let message = format!(
+                "region `{}` of the mesh has no material: name it in a [[tissue]], or give one [[tissue]] without `regions`",
+                mesh.region_names[r]
+            );
+            return Err(self.text.at(file.mesh.span().start, message));
+        }
+        let (mut terms, mut n_history) = (Vec::new(), 0);
+        let mut density = vec![0.0; mesh.region_names.len()];
+        for (k, spec) in file.tissue.iter().enumerate() {
+            let (law, constants) = self.law(spec)?;
+            let Lame { mu, lambda } = (law.moduli)(&constants);
+            let nu = lambda / (2.0 * (lambda + mu));
+            let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
+            if nu > LOCKING_NU && midsides.is_empty() {
+                warnings.push(format!(
+                    "Poisson's ratio {nu:.4} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too \
+                     small and forces too large; [mesh] order = 2 does not"
+                ));
+            }
+            let mine = |r: u32| material[r as usize] == k;
+            density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
+            let elements: Vec<usize> = (0..mesh.tets.len()).filter(|&e| mine(mesh.region[e])).collect();
+            if !elements.is_empty() {
+                let tets: Vec<[u32; 4]> = elements.iter().map(|&e| mesh.tets[e]).collect();
+                let midsides: Vec<[u32; 6]> = elements.iter().filter_map(|&e| midsides.get(e).copied()).collect();
+                let elements = Elements { X: &mesh.nodes, tets: &tets, midsides: &midsides };
+                terms.push((law.term)(&constants, elements));
+                if let Some(spec) = &spec.viscous {
+                    let branches = Branches { series: self.series(spec)?, first: n_history };
+                    n_history += branches.memory(&elements);
+                    terms.push((law.viscous)(&constants, branches, elements));
+                }
+            }
+        }
+        Ok(Tissue { terms, density, n_history })
+    }
+
+    /// Pairs (g, tau) of a Prony series.
+    pub(super) fn series(&self, spec: &ViscousSpec) -> Result<Vec<(f64, f64)>, SceneError> {
+        for (key, list) in [("g", &spec.g), ("tau", &spec.tau)] {
+            if let Some(bad) = list.get_ref().iter().find(|v| !find("tissue.viscous", key).range.holds(**v)) {
+                return Err(self.text.out_of_range("tissue.viscous", key, list, bad));
+            }
+        }
+        let (g, tau) = (spec.g.get_ref(), spec.tau.get_ref());
+        if g.is_empty() || g.len() != tau.len() {
+            let message =
+                format!("a Prony series takes as many `g` as `tau`, at least one; found {} and {}", g.len(), tau.len());
+            return Err(self.text.at(spec.g.span().start, message));
+        }
+        Ok(g.iter().copied().zip(tau.iter().copied()).collect())
+    }
+
+    /// The law of a material and its constants, in the law's order.
+    pub(super) fn law(&self, spec: &TissueSpec) -> Result<(&'static Law, Vec<Vec<f64>>), SceneError> {
+        let name = self.text.choice("tissue", "energy", &spec.energy)?.unwrap_or("stable-neo-hookean");
+        let law = effect::law(name).expect("keys list the catalogue's laws");
+        let wants = || law.keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
+        let mut constants: Vec<Vec<f64>> = vec![Vec::new(); law.keys.len()];
+        for (key, value) in spec.constants() {
+            let Some(value) = value else { continue };
+            let Some(k) = law.keys.iter().position(|wanted| *wanted == key) else {
+                return Err(self
+                    .text
+                    .at(value.span().start, format!("`{key}` is no constant of `{name}`, which takes {}", wants())));
+            };
+            let values = value.get_ref().values();
+            if let Some(bad) = values.iter().find(|v| !find("tissue", key).range.holds(**v)) {
+                return Err(self.text.out_of_range("tissue", key, value, bad));
+            }
+            if values.is_empty() || (values.len() > 1 && name != "ogden") {
+                return Err(self
+                    .text
+                    .at(value.span().start, format!("`{key}` of `{name}` is {} numbers; wanted one", values.len())));
+            }
+            constants[k] = values;
+        }
+        let place = spec.energy.as_ref().map_or(0, |e| e.span().start);
+        if let Some(k) = constants.iter().position(Vec::is_empty) {
+            let message = format!("`{name}` takes {}; `{}` is missing", wants(), law.keys[k]);
+            return Err(self.text.at(place, message));
+        }
+        if name == "ogden"
+            && (constants[0].len() != constants[1].len()
+                || constants[1].contains(&0.0)
+                || constants[0].iter().sum::<f64>() <= 0.0)
+        {
+            let message =
+                "`ogden` takes as many `mu` as `alpha`, no `alpha` of zero, and `mu` whose sum is positive".to_owned();
+            return Err(self.text.at(place, message));
+        }
+        Ok((law, constants))
+    }
+
+    pub(super) fn muscle(
+        &self,
+        spec: &MuscleSpec,
+        mesh: &TetMesh,
+        midsides: &[[u32; 6]],
+        input: usize,
+    ) -> Result<Box<dyn Term>, SceneError> {
+        let path: Vec<Vec3> = spec.path.get_ref().iter().map(|p| Vec3::from(*p)).collect();
+        let sound = path.len() >= 2
+            && path.iter().all(|p| p.iter().all(|c| c.is_finite()))
+            && path.windows(2).all(|s| s[0] != s[1]);
+        if !sound {
+            let message = "`path` takes at least two finite points, each other than the one before".to_owned();
+            return Err(self.text.at(spec.path.span().start, message));
+        }
+        let radius = self.text.checked("muscle", "radius", &spec.radius)?;
+        let mut fibre = Vec::new();
+        let (mut tets, mut mids) = (Vec::new(), Vec::new());
+        for (e, tet) in mesh.tets.iter().enumerate() {
+            let centre = tet.iter().map(|&a| mesh.nodes[a as usize]).sum::<Vec3>() / 4.0;
+            let (along, distance) = nearest_on_path(&path, &centre);
+            if distance <= radius {
+                tets.push(*tet);
+                mids.extend(midsides.get(e));
+                fibre.extend(std::iter::repeat_n(along, if midsides.is_empty() { 1 } else { 4 }));
+            }
+        }
+        if tets.is_empty() {
+            let message = format!(
+                "muscle `{}` holds no tetrahedron: no centre lies within {radius} m of its path; make `radius` larger or \
+                 the mesh finer",
+                spec.name.get_ref()
+            );
+            return Err(self.text.at(spec.name.span().start, message));
+        }
+        let muscle = Muscle {
+            fibre,
+            T0: self.text.number("muscle", "stress", &spec.stress)?.unwrap_or(100e3),
+            width: self.text.number("muscle", "width", &spec.width)?,
+            input,
+        };
+        Ok(Elements { X: &mesh.nodes, tets: &tets, midsides: &mids }.of(muscle))
+    }
+}
