@@ -45,7 +45,7 @@ fn recover(law: &str, tally: &mut Tally, place: fn(Vec3, Vec3) -> Vec3) -> Resul
     let mut trial = Trial::new(&scene.text(), tally)?;
     let centre = 0.5 * Vec3::from(scene.size());
     let x: Vec<Vec3> = trial.rest().iter().map(|X| place(*X, centre)).collect();
-    trial.sim.start_from(&x).map_err(|e| End::Fail(e.to_string()))?;
+    trial.start_from(&x)?;
     trial.step(0.1)?;
     trial.near(trial.rest(), AT_REST, "rest")
 }
@@ -58,7 +58,7 @@ fn scrambled(law: &str, tally: &mut Tally) -> Result<(), End> {
         let mut random = Random(seed);
         let mut trial = Trial::new(&text, tally)?;
         let x: Vec<Vec3> = trial.rest().iter().map(|_| size.component_mul(&random.vector())).collect();
-        trial.sim.start_from(&x).map_err(|e| End::Fail(e.to_string()))?;
+        trial.start_from(&x)?;
         trial.step(0.1)?;
         if let Err(End::Fail(message)) = trial.near(trial.rest(), AT_REST, "rest") {
             elsewhere.push(format!("seed {seed} {message}"));
