@@ -14,8 +14,8 @@ mod trial;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
-pub use trial::Tally;
 use trial::End;
+pub use trial::Tally;
 
 /// One law of each kind: quadratic, rotated, finite through inversion, infinite at J = 0, exponential.
 const LAWS: &[&str] = &["linear", "corotational", "stable-neo-hookean", "neo-hookean", "fung"];

@@ -28,7 +28,10 @@ pub const CASES: &[Case] = &[
         may_invert: NONE,
         ..case("alternate", "Turns the load around at every step; each answer is as the first.", alternate)
     },
-    Case { may_invert: NONE, ..case("unload", "Moves the jaw and pushes, then lets go; ends at rest to 1e-7 m.", unload) },
+    Case {
+        may_invert: NONE,
+        ..case("unload", "Moves the jaw and pushes, then lets go; ends at rest to 1e-7 m.", unload)
+    },
 ];
 
 fn twist(law: &str, tally: &mut Tally) -> Result<(), End> {

@@ -15,9 +15,11 @@ const fn start(name: &'static str, what: &'static str, body: fn(&str, &mut Tally
 }
 
 pub const CASES: &[Case] = &[
-    start("start-inverted", "Reflects the free nodes through the centre; the rest state must come back.", |law, tally| {
-        recover(law, tally, |x, c| 2.0 * c - x)
-    }),
+    start(
+        "start-inverted",
+        "Reflects the free nodes through the centre; the rest state must come back.",
+        |law, tally| recover(law, tally, |x, c| 2.0 * c - x),
+    ),
     start("start-mirrored", "Mirrors the free nodes in a plane; the rest state must come back.", |law, tally| {
         recover(law, tally, |x, c| Vec3::new(x.x, x.y, 2.0 * c.z - x.z))
     }),

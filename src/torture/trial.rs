@@ -105,7 +105,8 @@ impl<'a> Trial<'a> {
                 if report.iterations > MOST_SOLVES {
                     return fail(format!("a step took {} linear solves", report.iterations));
                 }
-                let numbers = [report.residual, report.correction, report.min_det_f, report.max_stretch, report.elastic];
+                let numbers =
+                    [report.residual, report.correction, report.min_det_f, report.max_stretch, report.elastic];
                 if !report.converged || numbers.iter().any(|v| !v.is_finite()) {
                     return fail(format!("the report is no answer: {report:?}"));
                 }

@@ -18,7 +18,19 @@ const STEP_EVERY: usize = 8;
 const MOST_CELLS: f64 = 200.0;
 /// What a number may turn into.
 const NUMBERS: [&str; 14] = [
-    "0", "-1", "1", "1e308", "-1e308", "1e-320", "nan", "inf", "-inf", "\"x\"", "[]", "[1.0]", "true",
+    "0",
+    "-1",
+    "1",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "nan",
+    "inf",
+    "-inf",
+    "\"x\"",
+    "[]",
+    "[1.0]",
+    "true",
     "9223372036854775807",
 ];
 
