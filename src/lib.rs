@@ -22,4 +22,5 @@ pub mod port;
 pub mod scene;
 pub mod sim;
 pub mod solve;
+pub mod torture;
 pub mod view;

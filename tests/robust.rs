@@ -4,7 +4,11 @@
 #[path = "verify/common.rs"]
 #[allow(dead_code)]
 mod common;
+#[path = "robust/fuzz.rs"]
+mod fuzz;
 #[path = "robust/inputs.rs"]
 mod inputs;
+#[path = "robust/torture.rs"]
+mod torture;
 #[path = "robust/violent.rs"]
 mod violent;

@@ -15,6 +15,7 @@ mod fmu;
 mod output;
 mod progress;
 mod run;
+mod torture;
 
 use std::process::ExitCode;
 
@@ -43,6 +44,8 @@ enum Command {
     Fmu(fmu::Fmu),
     /// Say what a scene holds: mesh, bones, variables, warnings
     Check(check::Check),
+    /// Run the catalogue of hard cases and say how each ends
+    Torture(torture::Torture),
 }
 
 /// Runs the command that the arguments name.
@@ -53,6 +56,7 @@ pub fn run() -> ExitCode {
         Command::Run(run) => run.run(),
         Command::Fmu(fmu) => fmu.run(),
         Command::Check(check) => check.run(),
+        Command::Torture(torture) => torture.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

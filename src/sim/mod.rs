@@ -95,6 +95,26 @@ pub enum SimError {
         /// Nodes of the model.
         wanted: usize,
     },
+    /// A start that has not one position for each node.
+    #[error("a start takes one position for each of the {wanted} nodes; found {found}")]
+    StartLength {
+        /// Positions found.
+        found: usize,
+        /// Nodes of the model.
+        wanted: usize,
+    },
+    /// A start position is NaN or infinite.
+    #[error("the start position of node {node} is ({x}, {y}, {z}); every position must be finite")]
+    StartNotFinite {
+        /// Node, 0-based.
+        node: usize,
+        /// Position found.
+        x: f64,
+        /// Position found.
+        y: f64,
+        /// Position found.
+        z: f64,
+    },
     /// `[inertia] start = "rest"` with bones that do not start at rest.
     #[error(
         "the scene starts at rest, but bone `{0}` does not: give it a start pose of zero or start = \"equilibrium\""
@@ -175,6 +195,26 @@ impl Sim {
             return Err(SimError::ForeignState { found: state.config.x.len(), wanted: self.model.mesh().nodes.len() });
         }
         self.state.clone_from(state);
+        Ok(())
+    }
+
+    /// Puts the free nodes at the positions `x` (m, one for each node of the mesh) and forgets the linearisation: the
+    /// next step seeks the equilibrium from there. Nodes of bones, time, velocities and outputs stay as they are.
+    ///
+    /// # Errors
+    /// [`SimError::StartLength`], [`SimError::StartNotFinite`]; nothing has changed then.
+    pub fn start_from(&mut self, x: &[crate::math::Vec3]) -> Result<(), SimError> {
+        let wanted = self.model.mesh().nodes.len();
+        if x.len() != wanted {
+            return Err(SimError::StartLength { found: x.len(), wanted });
+        }
+        if let Some((node, x)) = x.iter().enumerate().find(|(_, x)| !x.iter().all(|c| c.is_finite())) {
+            return Err(SimError::StartNotFinite { node, x: x.x, y: x.y, z: x.z });
+        }
+        for &a in &self.model.dofs().free {
+            self.state.config.x[a as usize] = x[a as usize];
+        }
+        self.state.linearisation = None;
         Ok(())
     }
 
