@@ -4,7 +4,7 @@ use super::SceneError;
 use super::bones::free_rings;
 use super::check::Text;
 use super::file::SceneFile;
-use super::materials::Tissue;
+use super::materials::{Tissue, stand_in};
 use super::place::nearest_point;
 use super::programme::Programme;
 use crate::effect::{Gravity, Inertia, lumped_masses};
@@ -141,6 +141,7 @@ impl Builder<'_> {
             pressures,
             markers,
             terms,
+            stand_in,
             n_history,
             inertia,
             layout,

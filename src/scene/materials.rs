@@ -21,6 +21,12 @@ pub(super) struct Tissue {
     pub n_history: usize,
 }
 
+/// Corotational elements of unit stiffness and a Poisson's ratio of 0.3; with bones alone the stiffness does not matter.
+pub(super) fn stand_in(mesh: &TetMesh, midsides: &[[u32; 6]]) -> Vec<Box<dyn Term>> {
+    let law = effect::law("corotational").expect("a law of the catalogue");
+    vec![(law.term)(&[vec![1.0], vec![0.3]], Elements { X: &mesh.nodes, tets: &mesh.tets, midsides })]
+}
+
 impl Builder<'_> {
     /// One term for each material, its overstress if it has one, and the density of each region.
     pub(super) fn tissue(

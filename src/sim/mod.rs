@@ -5,10 +5,11 @@
 mod access;
 mod model;
 mod ports;
+mod recover;
 mod state;
 mod step;
 
-pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, Unconstrained, osteotomy_edges};
+pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
 pub use ports::Layout;
 pub use state::{State, StateError};
 pub use step::StepReport;

@@ -64,6 +64,9 @@ pub struct Inertia {
     pub start_at_rest: bool,
 }
 
+/// Makes terms of all elements in a law that is defined everywhere and whose only rest is untangled.
+pub type StandIn = fn(&TetMesh, &[[u32; 6]]) -> Vec<Box<dyn Term>>;
+
 /// Everything a model is made of.
 pub struct ModelParts {
     /// Name of the scene.
@@ -84,6 +87,8 @@ pub struct ModelParts {
     pub markers: Vec<Marker>,
     /// The summands of the energy.
     pub terms: Vec<Box<dyn Term>>,
+    /// Makes the elements' stand-in for untangling a start; called only then.
+    pub stand_in: StandIn,
     /// Values that the terms remember from step to step.
     pub n_history: usize,
     /// Dynamics, if the scene has it.

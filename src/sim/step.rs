@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use super::model::{Drive, Model};
+use super::recover::untangle;
 use super::state::{Linearisation, State};
 use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
@@ -230,7 +231,14 @@ fn step_piece(
     }
     let at = At { t, dt, inputs, history, x_tilde, x_lag: &[] };
     let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
-    let inverted_before = strain_of(model, &at, &config.x).min_det_f <= 0.0;
+    let mut inverted_before = strain_of(model, &at, &config.x).min_det_f <= 0.0;
+    if inverted_before && linearisation.is_none() && !problem.is_quadratic() {
+        // A start that no step has led to.
+        let outcome = untangle(model, pivots, config)?;
+        report.iterations += outcome.iterations;
+        report.factorisations += outcome.factorisations;
+        inverted_before = strain_of(model, &at, &config.x).min_det_f <= 0.0;
+    }
 
     restore_factor(model, &problem, minimiser, factored, linearisation, config, report)?;
     place_bones(model, inputs, config);

@@ -56,6 +56,19 @@ fn set_and_get_allocate_nothing() {
 }
 
 #[test]
+fn a_step_after_the_first_allocates_nothing() {
+    let mut sim = Sim::new(Arc::new(cutis::load::embedded().unwrap().model)).unwrap();
+    let rotation = sim.model().ports().iter().position(|p| p.name == "bone.rotation").unwrap();
+    sim.initialise().unwrap();
+    for k in 1..=4 {
+        sim.set_f64(rotation, 3, &[0.01 * f64::from(k), 0.0, 0.0]).unwrap();
+        let mut factorisations = 0;
+        let counted = allocations(|| factorisations = sim.step(0.1).unwrap().factorisations);
+        assert!(k == 1 || factorisations == 0 && counted == 0, "step {k}: {counted} allocations, {factorisations} factors");
+    }
+}
+
+#[test]
 fn the_c_library_and_fmi_copy_without_allocation() {
     // SAFETY: handles and buffers of this test, used by one thread, lengths as asked.
     unsafe {
