@@ -33,7 +33,10 @@ impl Torture {
         }
         match failed {
             0 if self.markdown => Ok(()),
-            0 => Ok(println!("{n_rows} rows, none failed")),
+            0 => {
+                println!("{n_rows} rows, none failed");
+                Ok(())
+            }
             _ => Err(format!("{failed} of {n_rows} rows failed").into()),
         }
     }
