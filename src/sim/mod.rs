@@ -18,6 +18,10 @@ use std::sync::Arc;
 
 use crate::solve::SolveError;
 
+/// Steps (s) outside of these make squares of dt overflow.
+const SHORTEST_STEP: f64 = 1e-100;
+const LONGEST_STEP: f64 = 1e100;
+
 /// Why a simulation refused a call. The state is still the last accepted one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimError {
@@ -41,7 +45,7 @@ pub enum SimError {
     #[error(transparent)]
     Setup(#[from] SolveError),
     /// The step length is no positive number.
-    #[error("a step must be a positive, finite number of seconds; found {0:?}")]
+    #[error("a step must be a positive, finite number of seconds, from 1e-100 to 1e100; found {0:?}")]
     StepLength(f64),
     /// An input is NaN or infinite.
     #[error("input `{name}` is {value:?}; every input must be a finite number")]
@@ -175,7 +179,7 @@ impl Sim {
     /// # Errors
     /// [`SimError`]; the state is then the last accepted one, with the inputs as set.
     pub fn step(&mut self, dt: f64) -> Result<StepReport, SimError> {
-        if !(dt > 0.0 && dt.is_finite()) {
+        if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
             return Err(SimError::StepLength(dt));
         }
         step::advance(&self.model, &mut self.state, &mut self.work, dt)

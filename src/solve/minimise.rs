@@ -141,6 +141,9 @@ impl Minimiser {
                     self.factored = true;
                     return Ok(());
                 }
+                Err(_) if curvature == Curvature::Projected && problem.is_beyond_numbers(config) => {
+                    return Err(SolveError::NotFinite);
+                }
                 Err(block) if curvature == Curvature::Projected => {
                     return Err(SolveError::Singular { block, n_blocks: problem.dofs.n_blocks() });
                 }

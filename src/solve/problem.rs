@@ -3,6 +3,9 @@
 use crate::fem::{At, Configuration, Dofs, Term};
 use crate::math::{Vec3, log_rotation};
 
+/// Sizes of the model beyond which a motion is no motion of tissue.
+const FARTHEST: f64 = 1e6;
+
 /// A sum of terms over the unknowns, with all it depends on.
 #[derive(Clone, Copy)]
 pub struct Problem<'a> {
@@ -33,6 +36,13 @@ impl Problem<'_> {
     /// Whether the stiffness is the same everywhere.
     pub fn is_quadratic(&self) -> bool {
         self.dofs.bodies.is_empty() && self.terms.iter().all(|t| t.is_quadratic())
+    }
+
+    /// Whether a node has gone so far that stiffnesses there and elsewhere share no digits.
+    pub fn is_beyond_numbers(&self, config: &Configuration) -> bool {
+        let (low, high) = self.X.iter().fold((self.X[0], self.X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
+        let far = FARTHEST * (high - low).norm();
+        config.x.iter().zip(self.X).any(|(x, X)| (x - X).norm() > far)
     }
 
     /// Energy, J.
