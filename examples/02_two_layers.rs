@@ -41,7 +41,8 @@ name = "patch"
 "#
     );
     // Bones of our own: the bottom of the block, cut in a sliding middle and held ends with a gap between.
-    let block = cutis::load::from_text(&scene[..scene.find("[[bone]]").expect("above")].to_owned().add_bone("z_min"), None)?;
+    let block =
+        cutis::load::from_text(&scene[..scene.find("[[bone]]").expect("above")].to_owned().add_bone("z_min"), None)?;
     let mut mesh = block.model.mesh().clone();
     let bottom = mesh.node_set("z_min").expect("a block has it").nodes.clone();
     let distance = |a: &u32| (mesh.nodes[*a as usize].x - 0.04).abs();

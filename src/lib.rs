@@ -4,7 +4,14 @@
 //! The same `Sim` stands behind the C library, the FMI 2.0/3.0 component and the command line.
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
-#![warn(clippy::print_stdout, clippy::print_stderr, clippy::exit, clippy::dbg_macro, clippy::todo, clippy::unimplemented)]
+#![warn(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    clippy::exit,
+    clippy::dbg_macro,
+    clippy::todo,
+    clippy::unimplemented
+)]
 
 pub mod bytes;
 pub mod effect;

@@ -156,7 +156,14 @@ impl Types {
             // A type may not share its name with a variable; ours begin with a capital, theirs do not.
             let same = definitions.iter().filter(|d| d.unit == port.unit).count();
             let name = if same == 0 { quantity.to_owned() } else { format!("{quantity}{}", same + 1) };
-            definitions.push(Definition { name, unit: port.unit, ty: port.ty, single: port.single, min: port.min, max: port.max });
+            definitions.push(Definition {
+                name,
+                unit: port.unit,
+                ty: port.ty,
+                single: port.single,
+                min: port.min,
+                max: port.max,
+            });
         }
         Self { definitions }
     }

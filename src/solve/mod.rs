@@ -43,7 +43,9 @@ pub enum SolveError {
         n_blocks: usize,
     },
     /// The energy is not finite where the step starts.
-    #[error("the energy is not finite where the step starts: elements are inverted that the law does not allow to be, or the bones move further than the tissue can follow")]
+    #[error(
+        "the energy is not finite where the step starts: elements are inverted that the law does not allow to be, or the bones move further than the tissue can follow"
+    )]
     NotFinite,
     /// The factor would not fit a common machine's memory.
     #[error(

@@ -64,7 +64,10 @@ fn a_step_after_the_first_allocates_nothing() {
         sim.set_f64(rotation, 3, &[0.01 * f64::from(k), 0.0, 0.0]).unwrap();
         let mut factorisations = 0;
         let counted = allocations(|| factorisations = sim.step(0.1).unwrap().factorisations);
-        assert!(k == 1 || factorisations == 0 && counted == 0, "step {k}: {counted} allocations, {factorisations} factors");
+        assert!(
+            k == 1 || factorisations == 0 && counted == 0,
+            "step {k}: {counted} allocations, {factorisations} factors"
+        );
     }
 }
 

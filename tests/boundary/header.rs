@@ -18,8 +18,7 @@ fn header_is_up_to_date() {
     let source = std::fs::read_to_string(root().join("src/ffi/capi.rs")).unwrap();
     let abi =
         source.split("const ABI: u32 = ").nth(1).and_then(|s| s.split(';').next()).expect("capi.rs states the ABI");
-    let preface = format!(
-        "/* cutis: soft tissue of the human face. C99 and C++11.\n\
+    let preface = "/* cutis: soft tissue of the human face. C99 and C++11.\n\
          \x20*\n\
          \x20*   char why[256];\n\
          \x20*   CutisSim *sim = cutis_sim_new_default(why, sizeof why);\n\
@@ -32,8 +31,7 @@ fn header_is_up_to_date() {
          \x20*\n\
          \x20* All values are in SI units. Every call returns; none prints, exits or throws. A call that fails changes\n\
          \x20* nothing, and cutis_sim_message tells why. Generated from src/ffi/capi.rs; do not edit.\n\
-         \x20*/\n"
-    );
+         \x20*/\n";
     let macros = format!(
         "#define CUTIS_VERSION_MAJOR {major}\n#define CUTIS_VERSION_MINOR {minor}\n#define CUTIS_VERSION_PATCH {patch}\n#define CUTIS_ABI {abi}\n"
     );

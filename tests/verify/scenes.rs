@@ -93,7 +93,9 @@ fn accepted(table: &str) -> BTreeSet<String> {
     let probe = match table {
         "" => "no_such_key = 1\n".to_owned(),
         "tissue.viscous" => "[[tissue]]\n[tissue.viscous]\nno_such_key = 1\n".to_owned(),
-        "tissue" | "bone" | "muscle" | "load" | "pressure" | "marker" | "keyframe" => format!("[[{table}]]\nno_such_key = 1\n"),
+        "tissue" | "bone" | "muscle" | "load" | "pressure" | "marker" | "keyframe" => {
+            format!("[[{table}]]\nno_such_key = 1\n")
+        }
         _ => format!("[{table}]\nno_such_key = 1\n"),
     };
     let message = SceneFile::parse(&probe).unwrap_err().to_string();

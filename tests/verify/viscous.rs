@@ -57,7 +57,8 @@ fn slow(name: &str, F: &Mat3) -> f64 {
 
 #[test]
 fn stress_relaxes_as_the_series_says_whatever_the_step() {
-    for (name, F) in [("linear", shear(0.1)), ("neo-hookean", shear(0.1)), ("fung", shear(0.3)), ("ogden", shear(0.3))] {
+    for (name, F) in [("linear", shear(0.1)), ("neo-hookean", shear(0.1)), ("fung", shear(0.3)), ("ogden", shear(0.3))]
+    {
         let S = slow(name, &F);
         let ramp = 0.05;
         for cuts in [1, 7] {
@@ -127,7 +128,9 @@ fn overstress_has_the_derivatives_it_claims() {
             probe.term.add_gradient(&at, x, &mut g);
             g.iter().zip(&d).map(|(g, d)| g.dot(d)).sum::<f64>()
         };
-        let error = |h: f64| ((probe.term.energy(&at, &moved(h)) - probe.term.energy(&at, &moved(-h))) / (2.0 * h) - slope(&x)).abs();
+        let error = |h: f64| {
+            ((probe.term.energy(&at, &moved(h)) - probe.term.energy(&at, &moved(-h))) / (2.0 * h) - slope(&x)).abs()
+        };
         let (coarse, fine) = (error(4e-3), error(1e-3));
         let order = 0.5 * (coarse / fine).log2();
         assert!(coarse < 1e-10 || (1.9..2.1).contains(&order), "{}: order {order}, {coarse:.2e} {fine:.2e}", law.name);
@@ -160,7 +163,11 @@ fn a_loaded_block_creeps_to_its_slow_answer_and_repeats_its_bits() {
             saved = creeping.save();
         }
     }
-    let error = get(&slow, "skin.position").iter().zip(get(&creeping, "skin.position")).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let error = get(&slow, "skin.position")
+        .iter()
+        .zip(get(&creeping, "skin.position"))
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
     assert!(error < 1e-6, "off by {error:.1e} m from the slow answer");
     let end = get(&creeping, "skin.position");
     let bytes = saved.to_bytes(creeping.model());
