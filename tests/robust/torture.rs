@@ -9,10 +9,6 @@ const OPEN: &[(&str, &[&str])] = &[
     ("compress-30", &["corotational", "stable-neo-hookean"]),
     // 1 kN on a patch of soft tissue inverts 18 of 432 elements, in small steps, too; it does return to rest.
     ("force-1e4", &["stable-neo-hookean"]),
-    // m/dt^2 overflows below about 1e-154 s; the error speaks of inverted elements and of bones.
-    ("vanishing-steps", &["linear", "corotational", "stable-neo-hookean", "neo-hookean", "fung"]),
-    // 1e150 N stretches elements until the stiffness cannot be factored; the error speaks of tissue that nothing holds.
-    ("huge", &["corotational"]),
 ];
 
 #[test]
