@@ -232,7 +232,8 @@ fn step_piece(
     let at = At { t, dt, inputs, history, x_tilde, x_lag: &[] };
     let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
     let mut inverted_before = strain_of(model, &at, &config.x).min_det_f <= 0.0;
-    if inverted_before && linearisation.is_none() && !problem.is_quadratic() {
+    let untangled = inverted_before && linearisation.is_none() && !problem.is_quadratic();
+    if untangled {
         // A start that no step has led to.
         let outcome = untangle(model, pivots, config)?;
         report.iterations += outcome.iterations;
@@ -251,7 +252,16 @@ fn step_piece(
     }
     minimiser.predict(&problem, config, u);
     report.iterations += 1;
-    let outcome = minimiser.minimise(&problem, config)?;
+    let outcome = match minimiser.minimise(&problem, config) {
+        // A small piece of load alone, predicted beyond what the law allows: go there from where the tissue is.
+        Err(SolveError::NotFinite)
+            if piece <= SMALLEST_TO_AVOID_INVERSION && !untangled && u.iter().all(|u| *u == Vec3::zeros()) =>
+        {
+            config.copy_from(before);
+            minimiser.minimise(&problem, config)?
+        }
+        outcome => outcome?,
+    };
     report.count(&outcome);
     let inverts = || !problem.is_quadratic() && !inverted_before && strain_of(model, &at, &config.x).min_det_f <= 0.0;
     if piece > SMALLEST_TO_AVOID_INVERSION && inverts() {
