@@ -258,10 +258,12 @@ fn step_piece(
             if piece <= SMALLEST_TO_AVOID_INVERSION && !untangled && u.iter().all(|u| *u == Vec3::zeros()) =>
         {
             config.copy_from(before);
-            minimiser.minimise(&problem, config)?
+            minimiser.minimise(&problem, config)
         }
-        outcome => outcome?,
+        outcome => outcome,
     };
+    // A failed minimisation may have left another factor than the state remembers.
+    let outcome = outcome.inspect_err(|_| *factored = None)?;
     report.count(&outcome);
     let inverts = || !problem.is_quadratic() && !inverted_before && strain_of(model, &at, &config.x).min_det_f <= 0.0;
     if piece > SMALLEST_TO_AVOID_INVERSION && inverts() {
