@@ -262,11 +262,12 @@ fn step_piece(
         }
         outcome => outcome,
     };
-    // A failed minimisation may have left another factor than the state remembers.
+    // A piece that is not taken may leave another factor behind than the state remembers.
     let outcome = outcome.inspect_err(|_| *factored = None)?;
     report.count(&outcome);
     let inverts = || !problem.is_quadratic() && !inverted_before && strain_of(model, &at, &config.x).min_det_f <= 0.0;
     if piece > SMALLEST_TO_AVOID_INVERSION && inverts() {
+        *factored = None;
         return Err(SolveError::Inverts);
     }
     if outcome.factorisations > 0 {
