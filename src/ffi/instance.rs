@@ -11,7 +11,7 @@ use super::modes::{self, Call, Mode};
 use super::resources;
 use super::snapshot::Snapshot;
 use crate::port::{Causality, Port, Type};
-use crate::sim::{Sim, SimError, StepReport};
+use crate::sim::{Sim, StepReport};
 
 /// Communication points may differ from the instance's time by this, relative to the larger of time and step: ten
 /// steps of 0.1 add up to 0.9999999999999999.
@@ -135,31 +135,15 @@ impl Instance {
         Ok(())
     }
 
-    /// Finds the equilibrium of the start values if one of them moved since the last time. It is sought from rest each
-    /// time, so that a host which looks at outputs in between gets the same bits as one which does not.
+    /// Finds the equilibrium of the start values if one of them moved since the last time. `Sim::initialise` seeks it from
+    /// rest, so that a host which looks at outputs in between gets the same bits as one which does not.
     fn refresh(&mut self) -> Answer {
         if self.mode == modes::INITIALIZATION && self.stale {
-            self.back_to_rest().map_err(|why| error(chain(&why)))?;
             let report = self.sim.initialise().map_err(|why| error(chain(&why)))?;
             self.tell("initial equilibrium", &report);
             self.stale = false;
         }
         Ok(())
-    }
-
-    /// As after instantiation, but for time, inputs and parameters.
-    fn back_to_rest(&mut self) -> Result<(), SimError> {
-        let model = self.sim.model().clone();
-        let mut kept = Vec::new();
-        for (i, port) in model.ports().iter().enumerate().filter(|(_, p)| p.is_settable()) {
-            let mut values = vec![0.0; port.len()];
-            self.sim.get_f64(i, 0, &mut values)?;
-            kept.push((i, values));
-        }
-        let t = self.sim.time();
-        self.sim.reset();
-        self.sim.set_time(t);
-        kept.iter().try_for_each(|(i, values)| self.sim.set_f64(*i, 0, values))
     }
 
     /// Advances from `at` by `dt`, s. A step that fails leaves everything as it was and is a Discard.

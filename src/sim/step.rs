@@ -231,14 +231,15 @@ fn step_piece(
     }
     let at = At { t, dt, inputs, history, x_tilde, x_lag: &[] };
     let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
-    let mut inverted_before = strain_of(model, &at, &config.x).min_det_f <= 0.0;
-    let untangled = inverted_before && linearisation.is_none() && !problem.is_quadratic();
+    let is_inverted = |x: &[Vec3]| strain_of(model, &at, x).min_det_f <= 0.0;
+    // A start that no step has led to may be tangled.
+    let untangled = linearisation.is_none() && !problem.is_quadratic() && is_inverted(&config.x);
+    let mut still_tangled = false;
     if untangled {
-        // A start that no step has led to.
         let outcome = untangle(model, pivots, config)?;
         report.iterations += outcome.iterations;
         report.factorisations += outcome.factorisations;
-        inverted_before = strain_of(model, &at, &config.x).min_det_f <= 0.0;
+        still_tangled = is_inverted(&config.x);
     }
 
     restore_factor(model, &problem, minimiser, factored, linearisation, config, report)?;
@@ -265,8 +266,9 @@ fn step_piece(
     // A piece that is not taken may leave another factor behind than the state remembers.
     let outcome = outcome.inspect_err(|_| *factored = None)?;
     report.count(&outcome);
-    let inverts = || !problem.is_quadratic() && !inverted_before && strain_of(model, &at, &config.x).min_det_f <= 0.0;
-    if piece > SMALLEST_TO_AVOID_INVERSION && inverts() {
+    let inverted_before = || if untangled { still_tangled } else { is_inverted(&before.x) };
+    let avoid_inversion = piece > SMALLEST_TO_AVOID_INVERSION && !problem.is_quadratic();
+    if avoid_inversion && is_inverted(&config.x) && !inverted_before() {
         *factored = None;
         return Err(SolveError::Inverts);
     }
