@@ -23,5 +23,7 @@ mod rigid;
 mod scenes;
 #[path = "verify/time.rs"]
 mod time;
+#[path = "verify/tissue.rs"]
+mod tissue;
 #[path = "verify/viscous.rs"]
 mod viscous;

@@ -13,6 +13,7 @@ mod check;
 mod demo;
 mod fmu;
 mod output;
+mod presets;
 mod progress;
 mod run;
 mod torture;
@@ -44,6 +45,8 @@ enum Command {
     Fmu(fmu::Fmu),
     /// Say what a scene holds: mesh, bones, variables, warnings
     Check(check::Check),
+    /// Print the tissues that a scene can name, with their sources
+    Presets(presets::Presets),
     /// Run the catalogue of hard cases and say how each ends
     Torture(torture::Torture),
 }
@@ -56,6 +59,7 @@ pub fn run() -> ExitCode {
         Command::Run(run) => run.run(),
         Command::Fmu(fmu) => fmu.run(),
         Command::Check(check) => check.run(),
+        Command::Presets(presets) => presets.run(),
         Command::Torture(torture) => torture.run(),
     };
     match done {

@@ -2,19 +2,31 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case)]
 
+mod damage;
+mod fibre;
+mod graded;
 mod gravity;
 mod inertia;
+mod limit;
 mod load;
 mod muscle;
+mod nodal_pressure;
 mod pressure;
+mod prestress;
 mod tissue;
 mod viscous;
 
+pub use damage::{Damaged, Softening};
+pub use fibre::Fibre;
+pub use graded::Graded;
 pub use gravity::Gravity;
 pub use inertia::{Inertia, lumped_masses};
+pub use limit::Limits;
 pub use load::DeadLoad;
 pub use muscle::{Muscle, nearest_on_path};
+pub use nodal_pressure::{NodalPressure, Volume};
 pub use pressure::Pressure;
+pub use prestress::{Balance, Prestress};
 pub use tissue::{Branches, Elements, LAWS, Law, law};
 pub use viscous::{Measure, Viscous};
 

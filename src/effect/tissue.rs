@@ -1,11 +1,12 @@
 //! Elastic tissue: tetrahedra of one material; the catalogue of laws.
 
+use super::nodal_pressure::Volume;
 use super::viscous::{Measure, Viscous};
 use crate::energy::{
     Corotational, Energy, Fung, Isochoric, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, Principal, StVenantKirchhoff,
     StableNeoHookean, Stretches, VerondaWestmann, WithBulk, Yeoh,
 };
-use crate::fem::{Elastic, Material, OnElements, Solid, Term, tet4_points, tet10_points};
+use crate::fem::{Elastic, Material, OnElements, Solid, TET4_PLACES, TET10_PLACES, Term, tet4_points, tet10_points};
 use crate::math::Vec3;
 
 /// The elements of a tissue.
@@ -32,14 +33,27 @@ impl Elements<'_> {
 
     /// Points of integration of all elements.
     pub fn n_points(&self) -> usize {
-        self.tets.len() * if self.midsides.is_empty() { 1 } else { 4 }
+        self.tets.len() * self.places().len()
+    }
+
+    /// Barycentric coordinates of the points of an element.
+    pub fn places(&self) -> &'static [[f64; 4]] {
+        if self.midsides.is_empty() { &TET4_PLACES } else { &TET10_PLACES }
+    }
+
+    /// A value for each point of integration: `of` is given element and barycentric coordinates.
+    pub fn at_points<T>(&self, of: impl Fn(usize, &[f64; 4]) -> T) -> Vec<T> {
+        let of = &of;
+        (0..self.tets.len()).flat_map(|e| self.places().iter().map(move |L| of(e, L))).collect()
     }
 }
 
+/// Makes a law of its constants.
+type MakeMaterial = fn(&[Vec<f64>]) -> Box<dyn Material>;
 /// Makes a term of elements, given the constants of a law.
 type MakeTerm = fn(&[Vec<f64>], Elements) -> Box<dyn Term>;
-/// The same for a viscous overstress.
-type MakeOverstress = fn(&[Vec<f64>], Branches, Elements) -> Box<dyn Term>;
+/// Makes the viscous overstress of a law.
+type MakeOverstress = fn(&[Vec<f64>], Branches) -> Box<dyn Material>;
 
 /// An elastic law that a scene can choose.
 pub struct Law {
@@ -49,10 +63,28 @@ pub struct Law {
     pub keys: &'static [&'static str],
     /// Lame's constants at small strain, Pa.
     pub moduli: fn(&[Vec<f64>]) -> Lame,
+    /// The law by itself, for effects that wrap it.
+    pub material: MakeMaterial,
     /// The tissue as a term.
     pub term: MakeTerm,
-    /// Its viscous overstress as a term.
+    /// How its energy depends on volume.
+    pub volume: Volume,
+    /// Its viscous overstress.
     pub viscous: MakeOverstress,
+}
+
+impl Law {
+    /// The constants with another Lame's lambda and the same shear modulus.
+    pub fn with_lambda(&self, constants: &[Vec<f64>], lambda: f64) -> Vec<Vec<f64>> {
+        let mu = (self.moduli)(constants).mu;
+        let of = |(key, value): (&&str, &Vec<f64>)| match *key {
+            "E" => vec![mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu)],
+            "nu" => vec![lambda / (2.0 * (lambda + mu))],
+            "kappa" => vec![lambda + 2.0 / 3.0 * mu],
+            _ => value.clone(),
+        };
+        self.keys.iter().zip(constants).map(of).collect()
+    }
 }
 
 /// A Prony series and where its memory begins.
@@ -70,24 +102,28 @@ impl Branches {
         elements.n_points() * Viscous::<Linear>::len_at_point(self.series.len())
     }
 
-    fn over<M: Energy + 'static>(self, iso: M, measure: Measure, elements: Elements) -> Box<dyn Term> {
-        elements.of(Viscous { iso, branches: self.series, measure, first: self.first })
+    fn over<M: Energy + 'static>(self, iso: M, measure: Measure) -> Box<dyn Material> {
+        Box::new(Viscous { iso, branches: self.series, measure, first: self.first })
     }
 }
 
 /// The volume-free neo-Hookean law that has the shear modulus of a law in E and nu.
-fn viscous_neo_hookean(c: &[Vec<f64>], b: Branches, t: Elements) -> Box<dyn Term> {
+fn viscous_neo_hookean(c: &[Vec<f64>], b: Branches) -> Box<dyn Material> {
     let iso = WithBulk { law: MooneyRivlin { c10: 0.5 * lame(c).mu, c01: 0.0 }, kappa: 0.0 };
-    b.over(iso, Measure::Finite, t)
+    b.over(iso, Measure::Finite)
 }
 
-fn viscous_linear(c: &[Vec<f64>], b: Branches, t: Elements) -> Box<dyn Term> {
+fn viscous_linear(c: &[Vec<f64>], b: Branches) -> Box<dyn Material> {
     let mu = lame(c).mu;
-    b.over(Linear(Lame { mu, lambda: -2.0 / 3.0 * mu }), Measure::Small, t)
+    b.over(Linear(Lame { mu, lambda: -2.0 / 3.0 * mu }), Measure::Small)
 }
 
-fn viscous<L: Isochoric + 'static>(law: L, b: Branches, t: Elements) -> Box<dyn Term> {
-    b.over(WithBulk { law, kappa: 0.0 }, Measure::Finite, t)
+fn viscous<L: Isochoric + 'static>(law: L, b: Branches) -> Box<dyn Material> {
+    b.over(WithBulk { law, kappa: 0.0 }, Measure::Finite)
+}
+
+fn material<M: Energy + 'static>(law: M) -> Box<dyn Material> {
+    Box::new(Elastic(law))
 }
 
 fn term<M: Energy + 'static>(law: M, elements: Elements) -> Box<dyn Term> {
@@ -104,8 +140,8 @@ fn with_bulk(mu: f64, c: &[Vec<f64>]) -> Lame {
     Lame { mu, lambda: kappa - 2.0 / 3.0 * mu }
 }
 
-fn bulk<L: Isochoric + 'static>(law: L, c: &[Vec<f64>], tets: Elements) -> Box<dyn Term> {
-    term(WithBulk { law, kappa: c[c.len() - 1][0] }, tets)
+fn bulk<L: Isochoric>(law: L, c: &[Vec<f64>]) -> WithBulk<L> {
+    WithBulk { law, kappa: c[c.len() - 1][0] }
 }
 
 fn ogden(c: &[Vec<f64>]) -> Ogden {
@@ -129,51 +165,73 @@ fn veronda_westmann(c: &[Vec<f64>]) -> VerondaWestmann {
 }
 
 /// A law in Young's modulus and Poisson's ratio.
-const fn in_e_nu(name: &'static str, term: MakeTerm) -> Law {
-    Law { name, keys: &["E", "nu"], moduli: lame, term, viscous: viscous_neo_hookean }
+const fn in_e_nu(name: &'static str, material: MakeMaterial, term: MakeTerm) -> Law {
+    let volume = Volume::Quadratic;
+    Law { name, keys: &["E", "nu"], moduli: lame, material, term, volume, viscous: viscous_neo_hookean }
 }
 
 /// The elastic laws by name: the one list.
 pub const LAWS: &[Law] = &[
-    Law { viscous: viscous_linear, ..in_e_nu(Linear::NAME, |c, t| term(Linear(lame(c)), t)) },
-    in_e_nu(Corotational::NAME, |c, t| term(Corotational(lame(c)), t)),
-    in_e_nu(StVenantKirchhoff::NAME, |c, t| term(StVenantKirchhoff(lame(c)), t)),
-    in_e_nu(StableNeoHookean::NAME, |c, t| term(StableNeoHookean(lame(c)), t)),
-    in_e_nu(NeoHookean::NAME, |c, t| term(NeoHookean(lame(c)), t)),
+    Law {
+        viscous: viscous_linear,
+        volume: Volume::Linear,
+        ..in_e_nu(Linear::NAME, |c| material(Linear(lame(c))), |c, t| term(Linear(lame(c)), t))
+    },
+    in_e_nu(Corotational::NAME, |c| material(Corotational(lame(c))), |c, t| term(Corotational(lame(c)), t)),
+    in_e_nu(
+        StVenantKirchhoff::NAME,
+        |c| material(StVenantKirchhoff(lame(c))),
+        |c, t| term(StVenantKirchhoff(lame(c)), t),
+    ),
+    in_e_nu(StableNeoHookean::NAME, |c| material(StableNeoHookean(lame(c))), |c, t| term(StableNeoHookean(lame(c)), t)),
+    Law {
+        volume: Volume::Logarithmic,
+        ..in_e_nu(NeoHookean::NAME, |c| material(NeoHookean(lame(c))), |c, t| term(NeoHookean(lame(c)), t))
+    },
     Law {
         name: MooneyRivlin::NAME,
         keys: &["c10", "c01", "kappa"],
         moduli: |c| with_bulk(2.0 * (c[0][0] + c[1][0]), c),
-        term: |c, t| bulk(mooney_rivlin(c), c, t),
-        viscous: |c, b, t| viscous(mooney_rivlin(c), b, t),
+        material: |c| material(bulk(mooney_rivlin(c), c)),
+        term: |c, t| term(bulk(mooney_rivlin(c), c), t),
+        volume: Volume::Quadratic,
+        viscous: |c, b| viscous(mooney_rivlin(c), b),
     },
     Law {
         name: Yeoh::NAME,
         keys: &["c10", "c20", "c30", "kappa"],
         moduli: |c| with_bulk(2.0 * c[0][0], c),
-        term: |c, t| bulk(yeoh(c), c, t),
-        viscous: |c, b, t| viscous(yeoh(c), b, t),
+        material: |c| material(bulk(yeoh(c), c)),
+        term: |c, t| term(bulk(yeoh(c), c), t),
+        volume: Volume::Quadratic,
+        viscous: |c, b| viscous(yeoh(c), b),
     },
     Law {
         name: Fung::NAME,
         keys: &["mu", "b", "kappa"],
         moduli: |c| with_bulk(c[0][0], c),
-        term: |c, t| bulk(fung(c), c, t),
-        viscous: |c, b, t| viscous(fung(c), b, t),
+        material: |c| material(bulk(fung(c), c)),
+        term: |c, t| term(bulk(fung(c), c), t),
+        volume: Volume::Quadratic,
+        viscous: |c, b| viscous(fung(c), b),
     },
     Law {
         name: VerondaWestmann::NAME,
         keys: &["c1", "c2", "kappa"],
         moduli: |c| with_bulk(c[0][0] * c[1][0], c),
-        term: |c, t| bulk(veronda_westmann(c), c, t),
-        viscous: |c, b, t| viscous(veronda_westmann(c), b, t),
+        material: |c| material(bulk(veronda_westmann(c), c)),
+        term: |c, t| term(bulk(veronda_westmann(c), c), t),
+        volume: Volume::Quadratic,
+        viscous: |c, b| viscous(veronda_westmann(c), b),
     },
     Law {
         name: <Ogden as Principal>::NAME,
         keys: &["mu", "alpha", "kappa"],
         moduli: |c| with_bulk(c[0].iter().sum(), c),
+        material: |c| material(Stretches(ogden(c))),
         term: |c, t| term(Stretches(ogden(c)), t),
-        viscous: |c, b, t| b.over(Stretches(Ogden { kappa: 0.0, ..ogden(c) }), Measure::Finite, t),
+        volume: Volume::Quadratic,
+        viscous: |c, b| b.over(Stretches(Ogden { kappa: 0.0, ..ogden(c) }), Measure::Finite),
     },
 ];
 

@@ -12,6 +12,7 @@ mod ogden;
 mod principal;
 mod st_venant_kirchhoff;
 mod stable_neo_hookean;
+mod strain_limit;
 mod veronda_westmann;
 mod yeoh;
 
@@ -25,6 +26,7 @@ pub use ogden::Ogden;
 pub use principal::{Principal, Stretches};
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use stable_neo_hookean::StableNeoHookean;
+pub use strain_limit::StrainLimit;
 pub use veronda_westmann::VerondaWestmann;
 pub use yeoh::Yeoh;
 

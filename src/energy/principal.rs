@@ -56,7 +56,8 @@ impl<L: Principal> Energy for Stretches<L> {
             } else {
                 0.5 * (second[(i, i)] + second[(j, j)]) - second[(i, j)]
             };
-            let twist = (first[i] + first[j]) / sum;
+            // Opposite stretches of an inverted F: the decomposition turns over there, and no twist is its own.
+            let twist = if sum.abs() > f64::MIN_POSITIVE { (first[i] + first[j]) / sum } else { 0.0 };
             let (a, b) = (mode(i, j), mode(j, i));
             let (symmetric, skew) = ((a + b), (a - b));
             H += 0.5 * flip * symmetric * symmetric.transpose() + 0.5 * twist * skew * skew.transpose();

@@ -126,22 +126,35 @@ impl HessianSink for Scatter<'_> {
         let mut blocks = upper.iter();
         for (k, &a) in nodes.iter().enumerate() {
             for (&b, H) in nodes[k..].iter().zip(&mut blocks) {
-                let place = self.assembly.places[self.cursor];
-                self.cursor += 1;
-                match place {
-                    Place::Unknown(k) => self.assembly.K.blocks[k as usize] += H,
-                    Place::UnknownTransposed(k) => self.assembly.K.blocks[k as usize] += H.transpose(),
-                    Place::Coupling(k) => self.assembly.K_p.blocks[k as usize] += H,
-                    Place::CouplingTransposed(k) => self.assembly.K_p.blocks[k as usize] += H.transpose(),
-                    Place::Nowhere => {}
-                    Place::Rigid => self.add_rigid(a, b, H),
-                }
+                self.add_block(a, b, H);
+            }
+        }
+    }
+    fn add_outer(&mut self, nodes: &[u32], c: &[Vec3], scale: f64) {
+        for (k, &a) in nodes.iter().enumerate() {
+            for (&b, c_b) in nodes[k..].iter().zip(&c[k..]) {
+                self.add_block(a, b, &(scale * c[k] * c_b.transpose()));
             }
         }
     }
 }
 
 impl Scatter<'_> {
+    /// The next block of a clique.
+    fn add_block(&mut self, a: u32, b: u32, H: &Mat3) {
+        let Assembly { K, K_p, places } = &mut *self.assembly;
+        let place = places[self.cursor];
+        self.cursor += 1;
+        match place {
+            Place::Unknown(k) => K.blocks[k as usize] += H,
+            Place::UnknownTransposed(k) => K.blocks[k as usize] += H.transpose(),
+            Place::Coupling(k) => K_p.blocks[k as usize] += H,
+            Place::CouplingTransposed(k) => K_p.blocks[k as usize] += H.transpose(),
+            Place::Nowhere => {}
+            Place::Rigid => self.add_rigid(a, b, H),
+        }
+    }
+
     /// J_a^T H J_b into the unknowns, and its transpose where a and b differ.
     fn add_rigid(&mut self, a: u32, b: u32, H: &Mat3) {
         let Assembly { K, K_p, .. } = &mut *self.assembly;

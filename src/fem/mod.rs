@@ -17,5 +17,5 @@ pub use matrix::{BlockMatrix, CouplingMatrix, Pattern};
 pub use quadratic::{EDGES, add_midsides};
 pub use solid::{Elastic, Material, Point, Solid};
 pub use term::{At, Curvature, HessianSink, Kernel, OnElements, Strain, Term};
-pub use tet4::tet4_points;
-pub use tet10::tet10_points;
+pub use tet4::{TET4_PLACES, tet4_points};
+pub use tet10::{TET10_PLACES, tet10_points};

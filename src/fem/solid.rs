@@ -36,6 +36,33 @@ pub trait Material: Send + Sync {
     }
 }
 
+impl Material for Box<dyn Material> {
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+    fn psi(&self, at: &At, p: usize, F: &Mat3) -> f64 {
+        (**self).psi(at, p, F)
+    }
+    fn psi_and_P(&self, at: &At, p: usize, F: &Mat3) -> (f64, Mat3) {
+        (**self).psi_and_P(at, p, F)
+    }
+    fn dPdF(&self, at: &At, p: usize, F: &Mat3) -> Mat9 {
+        (**self).dPdF(at, p, F)
+    }
+    fn is_quadratic(&self) -> bool {
+        (**self).is_quadratic()
+    }
+    fn is_elastic(&self) -> bool {
+        (**self).is_elastic()
+    }
+    fn commit(&self, at: &At, p: usize, F: &Mat3, history: &mut [f64]) {
+        (**self).commit(at, p, F, history);
+    }
+    fn remembers(&self) -> bool {
+        (**self).remembers()
+    }
+}
+
 /// An [`Energy`] as a material that is the same everywhere and has no past.
 pub struct Elastic<M>(pub M);
 

@@ -19,6 +19,13 @@ pub struct At<'a> {
     pub x_lag: &'a [Vec3],
 }
 
+impl At<'_> {
+    /// At rest, with no time, input or past.
+    pub fn rest() -> Self {
+        At { t: 0.0, dt: 0.0, inputs: &[], x_tilde: &[], history: &[], x_lag: &[] }
+    }
+}
+
 /// Which Hessian is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Curvature {
@@ -57,6 +64,9 @@ impl Strain {
 pub trait HessianSink {
     /// Adds the upper triangle of blocks of `nodes`, row by row: (0,0), (0,1), ... (1,1), (1,2), ...
     fn add(&mut self, nodes: &[u32], upper: &[Mat3]);
+
+    /// Adds `scale c_a c_b^T` for every two of `nodes`: one clique, however many they are.
+    fn add_outer(&mut self, nodes: &[u32], c: &[Vec3], scale: f64);
 }
 
 /// A summand of the energy. Terms own constants; what evolves lies in [`At`].

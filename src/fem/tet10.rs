@@ -16,11 +16,13 @@ const NEAR: f64 = 0.585_410_196_624_968_5;
 /// (5 - sqrt 5)/20.
 const FAR: f64 = 0.138_196_601_125_010_5;
 
+/// Barycentric coordinates of the points.
+pub const TET10_PLACES: [[f64; 4]; 4] =
+    [[NEAR, FAR, FAR, FAR], [FAR, NEAR, FAR, FAR], [FAR, FAR, NEAR, FAR], [FAR, FAR, FAR, NEAR]];
+
 /// The points of a tetrahedron with corners and mid-edge nodes `X`, the latter in the order of `EDGES`.
 pub fn tet10_points(X: &[Vec3; 10]) -> [Point<10>; 4] {
-    [0, 1, 2, 3].map(|q| {
-        let mut L = [FAR; 4];
-        L[q] = NEAR;
+    TET10_PLACES.map(|L| {
         let dN = reference_gradients(L);
         let jacobian: Mat3 = X.iter().zip(&dN).map(|(X, d)| X * d.transpose()).sum();
         let inverse = jacobian.try_inverse().expect("rest volumes are positive");

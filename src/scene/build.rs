@@ -33,7 +33,21 @@ pub(super) struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn build(&self, file: &SceneFile, mut mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
+    fn build(&self, file: &SceneFile, mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
+        let Some(gravity) = &file.gravity else { return self.forward(file, mesh) };
+        let scan = self.text.triple("gravity", "scan", &gravity.scan)?;
+        match (self.text.choice("gravity", "rest", &gravity.rest)?, scan) {
+            (Some("inverse"), Some(scan)) => self.unweighted(file, mesh, scan),
+            (Some(_), None) => {
+                let at = gravity.rest.as_ref().map_or(0, |r| r.span().start);
+                Err(self.text.at(at, "`rest` of [gravity] needs `scan`, the gravity of the scan".to_owned()))
+            }
+            _ => self.forward(file, mesh),
+        }
+    }
+
+    /// The model of a mesh as it is.
+    pub(super) fn forward(&self, file: &SceneFile, mut mesh: TetMesh) -> Result<(Model, Programme), SceneError> {
         // Exhaustive, so that a new table cannot be forgotten here.
         let SceneFile {
             name,
@@ -96,7 +110,9 @@ impl Builder<'_> {
             let input = layout.first(Slot::Gravity).expect("a scene with gravity has its port");
             let g = self.text.triple("gravity", "acceleration", &spec.acceleration)?.unwrap_or([0.0, 0.0, -9.80665]);
             start[input..input + 3].copy_from_slice(&g);
-            terms.push(Box::new(Gravity { m: masses(), input }));
+            let differential = spec.rest.as_ref().is_none_or(|r| r.get_ref() == "differential");
+            let scan = self.text.triple("gravity", "scan", &spec.scan)?.filter(|_| differential);
+            terms.push(Box::new(Gravity { m: masses(), input, scan: scan.unwrap_or_default().into() }));
         }
         let inertia = match inertia {
             Some(spec) => {

@@ -58,6 +58,13 @@ impl Text<'_> {
         value.as_ref().map(|v| self.checked(table, name, v)).transpose()
     }
 
+    pub fn all_in_range(&self, table: &str, name: &str, values: &Spanned<Vec<f64>>) -> Result<(), SceneError> {
+        match values.get_ref().iter().find(|v| !find(table, name).range.holds(**v)) {
+            Some(bad) => Err(self.out_of_range(table, name, values, bad)),
+            None => Ok(()),
+        }
+    }
+
     pub fn triple(&self, table: &str, name: &str, value: &Option<Triple>) -> Result<Option<[f64; 3]>, SceneError> {
         value.as_ref().map(|v| self.vector(table, name, v).map(Into::into)).transpose()
     }

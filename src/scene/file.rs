@@ -61,10 +61,12 @@ pub struct BlockSpec {
     pub layers: Vec<(String, f64)>,
 }
 
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TissueSpec {
     pub regions: Option<Vec<Spanned<String>>>,
+    pub preset: Option<Spanned<String>>,
+    pub level: Option<Spanned<String>>,
     pub energy: Option<Spanned<String>>,
     #[serde(rename = "E")]
     pub E: Option<Spanned<Constant>>,
@@ -80,7 +82,60 @@ pub struct TissueSpec {
     pub c30: Option<Spanned<Constant>>,
     pub kappa: Option<Spanned<Constant>>,
     pub density: Option<Spanned<f64>>,
+    pub pressure: Option<Spanned<String>>,
     pub viscous: Option<ViscousSpec>,
+    pub fibre: Option<FibreSpec>,
+    pub damage: Option<DamageSpec>,
+    pub grade: Option<GradeSpec>,
+    pub limit: Option<LimitSpec>,
+    pub tension: Option<TensionSpec>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FibreSpec {
+    pub direction: Option<Triple>,
+    pub path: Option<Spanned<Vec<[f64; 3]>>>,
+    pub in_skin: Option<bool>,
+    pub k1: Spanned<f64>,
+    pub k2: Spanned<f64>,
+    pub dispersion: Option<Spanned<f64>>,
+    pub slack: Option<Spanned<f64>>,
+    pub damage: Option<DamageSpec>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DamageSpec {
+    pub onset: Spanned<f64>,
+    pub scale: Spanned<f64>,
+    pub most: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GradeSpec {
+    pub depth: Spanned<Vec<f64>>,
+    pub factor: Spanned<Vec<f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitSpec {
+    pub longest: Option<Spanned<f64>>,
+    pub shortest: Option<Spanned<f64>>,
+    pub longest_at_bone: Option<Spanned<f64>>,
+    pub shortest_at_bone: Option<Spanned<f64>>,
+    pub band: Option<Spanned<f64>>,
+    pub stiffness: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TensionSpec {
+    pub along: Spanned<f64>,
+    pub across: Option<Spanned<f64>>,
+    pub direction: Option<Triple>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -95,6 +150,8 @@ impl TissueSpec {
     pub fn constants(&self) -> [(&'static str, &Option<Spanned<Constant>>); 12] {
         let Self {
             regions: _,
+            preset: _,
+            level: _,
             energy: _,
             E,
             nu,
@@ -109,7 +166,13 @@ impl TissueSpec {
             c30,
             kappa,
             density: _,
+            pressure: _,
             viscous: _,
+            fibre: _,
+            damage: _,
+            grade: _,
+            limit: _,
+            tension: _,
         } = self;
         [
             ("E", E),
@@ -200,6 +263,8 @@ pub struct MarkerSpec {
 #[serde(deny_unknown_fields)]
 pub struct GravitySpec {
     pub acceleration: Option<Triple>,
+    pub scan: Option<Triple>,
+    pub rest: Option<Spanned<String>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -1,10 +1,13 @@
-//! Materials: tissues, their overstress, muscles.
+//! Materials: which tissue each region is made of, laws and their constants, muscles.
+
+use std::cell::OnceCell;
 
 use super::SceneError;
 use super::build::Builder;
-use super::file::{MuscleSpec, SceneFile, TissueSpec, ViscousSpec};
+use super::file::{BoneSpec, MuscleSpec, SceneFile, TissueSpec, ViscousSpec};
 use super::keys::find;
-use crate::effect::{self, Branches, Elements, Law, Muscle, nearest_on_path};
+use super::tissue::{Fields, Terms};
+use crate::effect::{self, Elements, Law, Muscle, nearest_on_path};
 use crate::energy::Lame;
 use crate::fem::Term;
 use crate::math::Vec3;
@@ -25,6 +28,12 @@ pub(super) struct Tissue {
 pub(super) fn stand_in(mesh: &TetMesh, midsides: &[[u32; 6]]) -> Vec<Box<dyn Term>> {
     let law = effect::law("corotational").expect("a law of the catalogue");
     vec![(law.term)(&[vec![1.0], vec![0.3]], Elements { X: &mesh.nodes, tets: &mesh.tets, midsides })]
+}
+
+/// Nodes of the sets that the bones name; names that do not exist are another's to report.
+fn attached(bones: &[BoneSpec], mesh: &TetMesh) -> std::collections::BTreeSet<u32> {
+    let set = |b: &BoneSpec| mesh.node_set(b.nodes.as_ref().unwrap_or(&b.name).get_ref()).map(|s| s.nodes.clone());
+    bones.iter().filter_map(set).flatten().collect()
 }
 
 impl Builder<'_> {
@@ -58,17 +67,21 @@ impl Builder<'_> {
             );
             return Err(self.text.at(file.mesh.span().start, message));
         }
-        let (mut terms, mut n_history) = (Vec::new(), 0);
+        let fields = Fields { mesh, bones: attached(&file.bone, mesh), depth: OnceCell::new() };
+        let mut out = Terms::default();
         let mut density = vec![0.0; mesh.region_names.len()];
         for (k, spec) in file.tissue.iter().enumerate() {
+            let spec = &self.with_preset(spec)?;
             let (law, constants) = self.law(spec)?;
             let Lame { mu, lambda } = (law.moduli)(&constants);
             let nu = lambda / (2.0 * (lambda + mu));
             let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
-            if nu > LOCKING_NU && midsides.is_empty() {
+            let nodal = spec.pressure.as_ref().is_some_and(|p| p.get_ref() == "nodal");
+            if nu > LOCKING_NU && midsides.is_empty() && !nodal {
                 warnings.push(format!(
                     "Poisson's ratio {nu:.4} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too \
-                     small and forces too large; [mesh] order = 2 does not"
+                     small and forces too large; pressure = \"nodal\" in its [[tissue]] (fast) or [mesh] order = 2 \
+                     (accurate) does not"
                 ));
             }
             let mine = |r: u32| material[r as usize] == k;
@@ -78,24 +91,16 @@ impl Builder<'_> {
                 let tets: Vec<[u32; 4]> = elements.iter().map(|&e| mesh.tets[e]).collect();
                 let midsides: Vec<[u32; 6]> = elements.iter().filter_map(|&e| midsides.get(e).copied()).collect();
                 let elements = Elements { X: &mesh.nodes, tets: &tets, midsides: &midsides };
-                terms.push((law.term)(&constants, elements));
-                if let Some(spec) = &spec.viscous {
-                    let branches = Branches { series: self.series(spec)?, first: n_history };
-                    n_history += branches.memory(&elements);
-                    terms.push((law.viscous)(&constants, branches, elements));
-                }
+                self.add_tissue(spec, law, &constants, elements, &fields, &mut out)?;
             }
         }
-        Ok(Tissue { terms, density, n_history })
+        Ok(Tissue { terms: out.terms, density, n_history: out.n_history })
     }
 
     /// Pairs (g, tau) of a Prony series.
     pub(super) fn series(&self, spec: &ViscousSpec) -> Result<Vec<(f64, f64)>, SceneError> {
-        for (key, list) in [("g", &spec.g), ("tau", &spec.tau)] {
-            if let Some(bad) = list.get_ref().iter().find(|v| !find("tissue.viscous", key).range.holds(**v)) {
-                return Err(self.text.out_of_range("tissue.viscous", key, list, bad));
-            }
-        }
+        self.text.all_in_range("tissue.viscous", "g", &spec.g)?;
+        self.text.all_in_range("tissue.viscous", "tau", &spec.tau)?;
         let (g, tau) = (spec.g.get_ref(), spec.tau.get_ref());
         if g.is_empty() || g.len() != tau.len() {
             let message =
@@ -153,14 +158,7 @@ impl Builder<'_> {
         midsides: &[[u32; 6]],
         input: usize,
     ) -> Result<Box<dyn Term>, SceneError> {
-        let path: Vec<Vec3> = spec.path.get_ref().iter().map(|p| Vec3::from(*p)).collect();
-        let sound = path.len() >= 2
-            && path.iter().all(|p| p.iter().all(|c| c.is_finite()))
-            && path.windows(2).all(|s| s[0] != s[1]);
-        if !sound {
-            let message = "`path` takes at least two finite points, each other than the one before".to_owned();
-            return Err(self.text.at(spec.path.span().start, message));
-        }
+        let path = self.path(&spec.path)?;
         let radius = self.text.checked("muscle", "radius", &spec.radius)?;
         let mut fibre = Vec::new();
         let (mut tets, mut mids) = (Vec::new(), Vec::new());

@@ -8,18 +8,24 @@
 mod bones;
 mod build;
 mod check;
+mod depth;
 mod file;
 mod keys;
 mod loads;
 mod materials;
 mod place;
+mod presets;
 mod programme;
+mod rest_shape;
 mod source;
+mod tissue;
 
 pub use build::build;
 pub use file::SceneFile;
 pub use keys::{KEYS, Key, Range, key_reference, tables};
+pub use presets::{Preset, preset_reference, presets};
 pub use programme::{Programme, Setting};
+pub use rest_shape::RestShapeError;
 pub use source::MeshSource;
 
 /// Why a scene was refused; line and column are 1-based.
@@ -38,6 +44,9 @@ pub enum SceneError {
         /// What was wanted, what was found, what the choices are.
         message: String,
     },
+    /// The shape without weight was not found.
+    #[error(transparent)]
+    RestShape(#[from] RestShapeError),
     /// The tissue is not held.
     #[error(transparent)]
     Unconstrained(#[from] crate::sim::Unconstrained),

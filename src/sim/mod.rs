@@ -172,6 +172,20 @@ impl Sim {
         Ok(report)
     }
 
+    /// Seeks the equilibrium under one group of inputs alone, all others as at rest.
+    ///
+    /// # Errors
+    /// As for [`Sim::step`].
+    ///
+    /// # Panics
+    /// If the model has no such inputs, or fewer.
+    pub(crate) fn start_under(&mut self, slot: crate::port::Slot, values: &[f64]) -> Result<StepReport, SimError> {
+        let first = self.model.parts().layout.first(slot).expect("the caller knows its scene");
+        self.state.inputs.copy_from_slice(&state::rest_inputs(&self.model));
+        self.state.inputs[first..first + values.len()].copy_from_slice(values);
+        self.initialise()
+    }
+
     /// Advances by `dt` seconds; all or nothing.
     ///
     /// A step spends about five times `solver.max_iterations` linear solves at most, however it is cut.

@@ -228,7 +228,7 @@ impl State {
 }
 
 /// The inputs under which the rest state is in equilibrium: no motion, no load; parameters as they start.
-fn rest_inputs(model: &Model) -> Vec<f64> {
+pub(super) fn rest_inputs(model: &Model) -> Vec<f64> {
     let parts = model.parts();
     let mut rest = vec![0.0; parts.layout.len()];
     if let Some(first) = parts.layout.first(crate::port::Slot::BonePivot) {

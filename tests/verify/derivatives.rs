@@ -96,8 +96,8 @@ fn a_planted_error_in_an_energy_is_found() {
 }
 
 /// Two tetrahedra that share a face.
-const REST: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [1.1, 0.1, 0.0], [0.2, 0.9, -0.1], [0.1, 0.2, 1.0], [1.0, 1.1, 0.9]];
-const TETS: [[u32; 4]; 2] = [[0, 1, 2, 3], [1, 2, 3, 4]];
+pub const REST: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [1.1, 0.1, 0.0], [0.2, 0.9, -0.1], [0.1, 0.2, 1.0], [1.0, 1.1, 0.9]];
+pub const TETS: [[u32; 4]; 2] = [[0, 1, 2, 3], [1, 2, 3, 4]];
 
 struct Dense(Vec<Vec<Mat3>>);
 
@@ -114,15 +114,27 @@ impl HessianSink for Dense {
             }
         }
     }
+    fn add_outer(&mut self, nodes: &[u32], c: &[Vec3], scale: f64) {
+        for (&a, ca) in nodes.iter().zip(c) {
+            for (&b, cb) in nodes.iter().zip(c) {
+                self.0[a as usize][b as usize] += scale * ca * cb.transpose();
+            }
+        }
+    }
 }
 
-fn check_term(term: &dyn Term, rest: &[Vec3], seed: u64) {
+pub fn check_term(term: &dyn Term, rest: &[Vec3], seed: u64) {
+    check_term_at(term, rest, seed, &[]);
+}
+
+/// The same with a past.
+pub fn check_term_at(term: &dyn Term, rest: &[Vec3], seed: u64, history: &[f64]) {
     let n = rest.len();
     let mut random = Random(seed);
     let inputs: Vec<f64> = (0..8).map(|_| random.number()).collect();
     let x_tilde: Vec<Vec3> = rest.iter().map(|X| X + 0.2 * random.vector()).collect();
     let x_lag: Vec<Vec3> = rest.iter().map(|X| X + 0.2 * random.vector()).collect();
-    let at = At { t: 0.1, dt: 0.3, inputs: &inputs, history: &[], x_tilde: &x_tilde, x_lag: &x_lag };
+    let at = At { t: 0.1, dt: 0.3, inputs: &inputs, history, x_tilde: &x_tilde, x_lag: &x_lag };
     for _ in 0..10 {
         let x: Vec<Vec3> = rest.iter().map(|X| X + 0.1 * random.vector()).collect();
         let d: Vec<Vec3> = x.iter().map(|_| random.vector()).collect();
@@ -159,7 +171,7 @@ fn terms_have_the_derivatives_they_claim() {
         check_term(&*(law.term)(&constants(law, 1.0), elements), &rest, SEED);
     }
     let m = vec![1.0, 2.0, 0.5, 1.5, 3.0];
-    check_term(&Gravity { m: m.clone(), input: 2 }, &rest, SEED + 1);
+    check_term(&Gravity { m: m.clone(), input: 2, scan: Vec3::new(0.3, 0.0, -1.0) }, &rest, SEED + 1);
     check_term(&Inertia { m }, &rest, SEED + 2);
     check_term(&DeadLoad { shares: vec![(1, 0.25), (4, 0.75)], input: 1 }, &rest, SEED + 3);
     check_term(&Pressure { triangles: vec![[0, 1, 2], [1, 4, 2]], input: 3 }, &rest, SEED + 4);

@@ -23,7 +23,7 @@ impl Probe {
         let elements = Elements { X: &rest, tets: &[[0, 1, 2, 3]], midsides: &[] };
         let branches = Branches { series: SERIES.to_vec(), first: 0 };
         let memory = branches.memory(&elements);
-        let term = (law.viscous)(&constants(law, 1.0), branches, elements);
+        let term = elements.of((law.viscous)(&constants(law, 1.0), branches));
         let mut probe = Probe { term, history: vec![0.0; memory], memory };
         probe.go(0.0, &Mat3::identity());
         probe
