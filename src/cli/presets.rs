@@ -1,7 +1,7 @@
 //! `cutis presets`: tissues by name, with their numbers and sources.
 
 use super::Done;
-use crate::scene::preset_reference;
+use cutis::scene::preset_reference;
 
 /// Print the presets.
 #[derive(clap::Args)]
