@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::bones::free_rings;
 use super::check::Text;
-use super::file::SceneFile;
+use super::file::{InertiaSpec, SceneFile};
 use super::materials::{Tissue, stand_in};
 use super::place::nearest_point;
 use super::programme::Programme;
@@ -11,7 +11,7 @@ use crate::effect::{Gravity, Inertia, lumped_masses};
 use crate::fem::add_midsides;
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::Slot;
-use crate::sim::{self, Drive, Layout, Marker, Model, ModelParts};
+use crate::sim::{self, Drive, Layout, Marker, Model, ModelParts, Scheme};
 use crate::solve::Strategy;
 
 /// Pairs that the quasi-Newton method remembers.
@@ -102,7 +102,12 @@ impl Builder<'_> {
             Some(spec) => {
                 terms.push(Box::new(Inertia { m: masses() }));
                 let start = self.text.choice("inertia", "start", &spec.start)?.unwrap_or("equilibrium");
-                Some(sim::Inertia { m: masses(), start_at_rest: start == "rest" })
+                Some(sim::Inertia {
+                    m: masses(),
+                    start_at_rest: start == "rest",
+                    scheme: self.scheme(spec)?,
+                    damping_mass: self.text.number("inertia", "damping_mass", &spec.damping_mass)?.unwrap_or(0.0),
+                })
             }
             None => None,
         };
@@ -156,6 +161,23 @@ impl Builder<'_> {
         };
         let tracks = self.tracks(file, model.ports())?;
         Ok((model, Programme { dt: dt.unwrap_or(0.1), end: end.unwrap_or(1.0), tracks }))
+    }
+}
+
+impl Builder<'_> {
+    fn scheme(&self, spec: &InertiaSpec) -> Result<Scheme, SceneError> {
+        let name = self.text.choice("inertia", "scheme", &spec.scheme)?;
+        let rho = self.text.number("inertia", "rho", &spec.rho)?;
+        if let (Some(rho), true) = (&spec.rho, name != Some("generalised-alpha")) {
+            let message = "`rho` belongs to `scheme = \"generalised-alpha\"`".to_owned();
+            return Err(self.text.at(rho.span().start, message));
+        }
+        Ok(match name {
+            Some("bdf2") => Scheme::Bdf2,
+            Some("generalised-alpha") => Scheme::GeneralisedAlpha { rho: rho.unwrap_or(0.8) },
+            Some("implicit-midpoint") => Scheme::GeneralisedAlpha { rho: 1.0 },
+            _ => Scheme::BackwardEuler,
+        })
     }
 }
 

@@ -206,6 +206,9 @@ pub struct GravitySpec {
 #[serde(deny_unknown_fields)]
 pub struct InertiaSpec {
     pub start: Option<Spanned<String>>,
+    pub scheme: Option<Spanned<String>>,
+    pub rho: Option<Spanned<f64>>,
+    pub damping_mass: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -4,13 +4,17 @@
 
 mod access;
 mod model;
+mod motion;
 mod ports;
 mod recover;
+mod scheme;
+mod start;
 mod state;
 mod step;
 
 pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
 pub use ports::Layout;
+pub use scheme::Scheme;
 pub use state::{State, StateError};
 pub use step::StepReport;
 
@@ -219,6 +223,8 @@ impl Sim {
             self.state.config.x[a as usize] = x[a as usize];
         }
         self.state.linearisation = None;
+        self.state.motion.memory.fill([crate::math::Vec3::zeros(); 2]);
+        self.state.motion.dt = 0.0;
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use sha2::{Digest, Sha256};
 
 use super::ports::{Layout, table};
+use super::scheme::Scheme;
 use crate::fem::{Dofs, Term};
 use crate::math::{Mat3, Vec3, svd};
 use crate::mesh::{SKIN, TetMesh};
@@ -62,6 +63,10 @@ pub struct Inertia {
     pub m: Vec<f64>,
     /// Whether time starts at rest rather than in equilibrium.
     pub start_at_rest: bool,
+    /// The time integrator.
+    pub scheme: Scheme,
+    /// Damping in proportion to the mass, 1/s.
+    pub damping_mass: f64,
 }
 
 /// Makes terms of all elements in a law that is defined everywhere and whose only rest is untangled.
@@ -189,6 +194,10 @@ impl Model {
     /// What is unknown.
     pub fn dofs(&self) -> &Dofs {
         &self.dofs
+    }
+    /// Whether the stiffness is the same everywhere.
+    pub(super) fn is_quadratic(&self) -> bool {
+        self.dofs.bodies.is_empty() && self.parts.terms.iter().all(|t| t.is_quadratic())
     }
     /// Mesh nodes of the skin, in the order of `skin.position`.
     pub fn skin(&self) -> &[u32] {

@@ -23,8 +23,7 @@ pub(super) fn untangle(model: &Model, pivots: &[Vec3], config: &mut Configuratio
     let X = &parts.mesh.nodes;
     let terms = (parts.stand_in)(&parts.mesh, &parts.midsides);
     let wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
-    let at = At { t: 0.0, dt: 0.0, inputs: &[], history: &[], x_tilde: &[], x_lag: &[] };
-    let problem = Problem { terms: &terms, dofs: model.dofs(), X, pivots, wrenches: &wrenches, at };
+    let problem = Problem { terms: &terms, dofs: model.dofs(), X, pivots, wrenches: &wrenches, at: At::NOWHERE };
     let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
     let strategy = Strategy { tolerance: COARSE * (high - low).norm(), ..STRATEGY };
     let mut minimiser = Minimiser::new(&problem, strategy)?;

@@ -1,12 +1,15 @@
 //! One host step: targets, prediction, minimisation, acceptance. All or nothing.
 //!
-//! Quasi-static equilibrium and backward Euler are one minimisation (see `effect::inertia`); a step that fails is cut
-//! into smaller pieces of load and time.
+//! Quasi-static equilibrium and the steps of every time integrator are one minimisation (see `effect::inertia` and
+//! `scheme`); a step that fails is cut into smaller pieces of load and time.
 
 use std::sync::Arc;
 
 use super::model::{Drive, Model};
+use super::motion::Motion;
 use super::recover::untangle;
+use super::scheme::Scheme;
+use super::start::accelerations;
 use super::state::{Linearisation, State};
 use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
@@ -64,7 +67,7 @@ pub(super) struct Workspace {
     config: Configuration,
     /// Where the piece at hand started from.
     before: Configuration,
-    v: Vec<Vec3>,
+    motion: Motion,
     /// What terms remember, and where the next memory is written.
     history: Vec<f64>,
     remembered: Vec<f64>,
@@ -87,14 +90,14 @@ impl Workspace {
             X,
             pivots: &pivots,
             wrenches: &wrenches,
-            at: At { t: 0.0, dt: 0.0, inputs: &parts.start, history: &[], x_tilde: X, x_lag: X },
+            at: At { inputs: &parts.start, x_tilde: X, x_lag: X, ..At::NOWHERE },
         };
         Ok(Workspace {
             minimiser: Minimiser::new(&problem, parts.strategy)?,
             factored: None,
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             before: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
-            v: vec![Vec3::zeros(); if parts.inertia.is_some() { X.len() } else { 0 }],
+            motion: Motion::still(X.len(), parts.inertia.as_ref()),
             history: vec![0.0; parts.n_history],
             remembered: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
@@ -122,12 +125,28 @@ pub(super) fn initialise(model: &Model, state: &mut State, work: &mut Workspace)
         }
         state.applied.copy_from_slice(&state.inputs);
         state.outputs.converged = true;
+        set_off(model, state, work);
         return Ok(StepReport::new(0));
     }
     let report = advance(model, state, work, 0.0)?;
     // Nothing has moved yet: the way to the start equilibrium is no velocity.
-    state.v.fill(Vec3::zeros());
+    state.motion.halt();
     Ok(report)
+}
+
+/// Gives the tissue the acceleration that its forces make at rest, where the scheme remembers one.
+fn set_off(model: &Model, state: &mut State, work: &mut Workspace) {
+    let parts = model.parts();
+    let Some(inertia) = parts.inertia.as_ref().filter(|i| matches!(i.scheme, Scheme::GeneralisedAlpha { .. })) else {
+        return;
+    };
+    read_wrenches(model, &state.inputs, &mut work.wrenches);
+    let Workspace { pivots, wrenches, inputs, history, .. } = work;
+    history.copy_from_slice(&state.history);
+    let at = At { t: state.t, inputs, history, x_tilde: &parts.mesh.nodes, ..At::NOWHERE };
+    let problem = Problem { terms: &parts.terms, dofs: model.dofs(), X: &parts.mesh.nodes, pivots, wrenches, at };
+    let a = accelerations(&problem, &state.config, &inertia.m);
+    state.motion.memory.iter_mut().zip(a).for_each(|(memory, a)| memory[0] = a);
 }
 
 /// Moves `state` on by `dt` seconds, or leaves it as it is.
@@ -135,7 +154,7 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     check_inputs(model, &state.inputs)?;
     read_pivots(model, &state.inputs, &mut work.pivots);
     work.config.copy_from(&state.config);
-    work.v.copy_from_slice(&state.v);
+    work.motion.copy_from(&state.motion);
     work.history.copy_from_slice(&state.history);
     let mut report = StepReport::new(0);
     let mut linearisation = state.linearisation.clone();
@@ -168,7 +187,7 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
             }
         }
     }
-    let at = At { t: state.t + dt, dt, inputs: &work.inputs, history: &work.history, x_tilde: &[], x_lag: &[] };
+    let at = At { t: state.t + dt, dt, inputs: &work.inputs, history: &work.history, ..At::NOWHERE };
     let strain = strain_of(model, &at, &work.config.x);
     if strain.min_det_f <= 0.0 && state.outputs.min_det_f > 0.0 {
         report.warnings.push(format!("elements are turned inside out (smallest det F {:.3})", strain.min_det_f));
@@ -176,7 +195,7 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     warn_of_jumps(model, &state.config, &work.config, &mut report);
     state.t += dt;
     state.config.copy_from(&work.config);
-    state.v.copy_from_slice(&work.v);
+    state.motion.copy_from(&work.motion);
     state.history.copy_from_slice(&work.history);
     state.applied.copy_from_slice(&work.inputs);
     state.linearisation = linearisation;
@@ -224,16 +243,24 @@ fn step_piece(
 ) -> Result<(), SolveError> {
     let parts = model.parts();
     let dofs = model.dofs();
-    let Workspace { minimiser, factored, config, before, v, history, remembered, inputs, x_tilde, pivots, u, wrenches } =
-        work;
-    for ((y, x), v) in x_tilde.iter_mut().zip(&config.x).zip(&*v) {
-        *y = x + dt * v;
-    }
-    let at = At { t, dt, inputs, history, x_tilde, x_lag: &[] };
-    let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
+    let Workspace {
+        minimiser,
+        factored,
+        config,
+        before,
+        motion,
+        history,
+        remembered,
+        inputs,
+        x_tilde,
+        pivots,
+        u,
+        wrenches,
+    } = work;
+    let at = At { t, dt, inputs, history, ..At::NOWHERE };
     let is_inverted = |x: &[Vec3]| strain_of(model, &at, x).min_det_f <= 0.0;
     // A start that no step has led to may be tangled.
-    let untangled = linearisation.is_none() && !problem.is_quadratic() && is_inverted(&config.x);
+    let untangled = linearisation.is_none() && !model.is_quadratic() && is_inverted(&config.x);
     let mut still_tangled = false;
     if untangled {
         let outcome = untangle(model, pivots, config)?;
@@ -242,9 +269,16 @@ fn step_piece(
         still_tangled = is_inverted(&config.x);
     }
 
-    restore_factor(model, &problem, minimiser, factored, linearisation, config, report)?;
     place_bones(model, inputs, config);
     target_increments(model, inputs, pivots, config, u);
+    let formula =
+        parts.inertia.as_ref().filter(|_| dt > 0.0).map(|i| (i.damping_mass, i.scheme.formula(dt, motion.dt)));
+    if let Some((damping, formula)) = &formula {
+        motion.predict(formula, *damping, dofs, &before.x, u, x_tilde);
+    }
+    let at = At { x_tilde, ..in_time(model, at, motion.dt) };
+    let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
+    restore_factor(model, &problem, motion.dt, minimiser, factored, linearisation, config, report)?;
     if !problem.is_quadratic() {
         if dt == 0.0 || parts.inertia.is_none() {
             move_along(dofs.prescribed.as_slice(), config, u);
@@ -277,8 +311,10 @@ fn step_piece(
             config: minimiser.factored_at().clone(),
             t,
             dt,
+            dt_before: motion.dt,
             inputs: inputs.clone(),
             history: history.clone(),
+            x_tilde: x_tilde.clone(),
         };
         let made = Arc::new(made);
         *factored = Some(made.clone());
@@ -289,18 +325,30 @@ fn step_piece(
         parts.terms.iter().filter(|t| t.remembers()).for_each(|t| t.commit(&at, &config.x, remembered));
         std::mem::swap(history, remembered);
     }
-    if parts.inertia.is_some() && dt > 0.0 {
-        for ((v, x), x0) in v.iter_mut().zip(&config.x).zip(&before.x) {
-            *v = (x - x0) / dt;
-        }
+    if let Some((_, formula)) = &formula {
+        motion.arrive(formula, dt, dofs, before, config);
     }
     Ok(())
 }
 
+/// `at` with the coefficients of the scene's scheme, after a piece of `dt_before`.
+fn in_time<'a>(model: &Model, at: At<'a>, dt_before: f64) -> At<'a> {
+    match &model.parts().inertia {
+        Some(i) if at.dt > 0.0 => At {
+            inertia: i.scheme.formula(at.dt, dt_before).coefficient(i.damping_mass),
+            difference: i.scheme.difference(at.dt, dt_before),
+            ..at
+        },
+        _ => at,
+    }
+}
+
 /// Makes the minimiser's factor the one the state remembers, or a new one at `config` if there is none that serves.
+#[allow(clippy::too_many_arguments)] // the halves of a workspace
 fn restore_factor(
     model: &Model,
     problem: &Problem,
+    dt_before: f64,
     minimiser: &mut Minimiser,
     factored: &mut Option<Arc<Linearisation>>,
     linearisation: &mut Option<Arc<Linearisation>>,
@@ -308,14 +356,22 @@ fn restore_factor(
     report: &mut StepReport,
 ) -> Result<(), SolveError> {
     let dt = problem.at.dt;
+    let as_made = |l: &Linearisation| in_time(model, At { dt: l.dt, ..At::NOWHERE }, l.dt_before);
+    let near = |a: f64, b: f64| a == b || a != 0.0 && b != 0.0 && (a / b).ln().abs() <= DT_DRIFT;
     let serves = |l: &Linearisation| {
         model.parts().inertia.is_none() && model.parts().n_history == 0
-            || (l.dt == 0.0) == (dt == 0.0) && (dt == 0.0 || (l.dt / dt).ln().abs() <= DT_DRIFT)
+            || near(l.dt, dt) && near(as_made(l).inertia.sqrt(), problem.at.inertia.sqrt())
     };
     if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
         let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
         if !(same && minimiser.is_factored()) {
-            let at = At { t: wanted.t, dt: wanted.dt, inputs: &wanted.inputs, history: &wanted.history, ..problem.at };
+            let at = At {
+                t: wanted.t,
+                inputs: &wanted.inputs,
+                history: &wanted.history,
+                x_tilde: &wanted.x_tilde,
+                ..as_made(wanted)
+            };
             *factored = None;
             minimiser.linearise(&Problem { at, ..*problem }, &wanted.config)?;
             *factored = Some(wanted.clone());
@@ -329,8 +385,10 @@ fn restore_factor(
         config: config.clone(),
         t: problem.at.t,
         dt,
+        dt_before,
         inputs: problem.at.inputs.to_vec(),
         history: problem.at.history.to_vec(),
+        x_tilde: problem.at.x_tilde.to_vec(),
     });
     *factored = Some(made.clone());
     *linearisation = Some(made);
@@ -487,8 +545,7 @@ fn read_outputs(model: &Model, state: &mut State, work: &Workspace, report: &Ste
     o.elastic = report.elastic;
     o.min_det_f = report.min_det_f;
     o.max_stretch = report.max_stretch;
-    o.kinetic = parts
-        .inertia
-        .as_ref()
-        .map_or(0.0, |inertia| 0.5 * inertia.m.iter().zip(&state.v).map(|(m, v)| m * v.norm_squared()).sum::<f64>());
+    o.kinetic = parts.inertia.as_ref().map_or(0.0, |inertia| {
+        0.5 * inertia.m.iter().zip(&state.motion.v).map(|(m, v)| m * v.norm_squared()).sum::<f64>()
+    });
 }

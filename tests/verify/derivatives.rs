@@ -122,7 +122,7 @@ fn check_term(term: &dyn Term, rest: &[Vec3], seed: u64) {
     let inputs: Vec<f64> = (0..8).map(|_| random.number()).collect();
     let x_tilde: Vec<Vec3> = rest.iter().map(|X| X + 0.2 * random.vector()).collect();
     let x_lag: Vec<Vec3> = rest.iter().map(|X| X + 0.2 * random.vector()).collect();
-    let at = At { t: 0.1, dt: 0.3, inputs: &inputs, history: &[], x_tilde: &x_tilde, x_lag: &x_lag };
+    let at = At { t: 0.1, dt: 0.3, inertia: 7.0, inputs: &inputs, x_tilde: &x_tilde, x_lag: &x_lag, ..At::NOWHERE };
     for _ in 0..10 {
         let x: Vec<Vec3> = rest.iter().map(|X| X + 0.1 * random.vector()).collect();
         let d: Vec<Vec3> = x.iter().map(|_| random.vector()).collect();

@@ -125,3 +125,134 @@ fn damaged_states_are_refused() {
     let other = crate::common::sim(&format!("{BAR}[[bone]]\nname = \"root\"\nnodes = \"z_max\"\n"));
     assert!(State::from_bytes(&bytes, other.model()).unwrap_err().to_string().contains("belongs to model"));
 }
+
+/// A scheme and its order.
+const SCHEMES: [(&str, f64); 5] = [
+    ("scheme = \"backward-euler\"", 1.0),
+    ("scheme = \"bdf2\"", 2.0),
+    ("scheme = \"generalised-alpha\"\nrho = 0.5", 2.0),
+    ("scheme = \"generalised-alpha\"", 2.0),
+    ("scheme = \"implicit-midpoint\"", 2.0),
+];
+/// A small soft bar under a load that grows smoothly.
+const SWUNG: &str = "[mesh.block]\nsize = [0.02, 0.02, 0.04]\ncells = [1, 1, 2]\n[solver]\nmethod = \"newton\"\n\
+                     tolerance = 1e-11\n[[bone]]\nname = \"root\"\nnodes = \"z_min\"\n[gravity]\nacceleration = [0, 0, 0]\n";
+/// Lengths of steps in turn, of mean 1.
+const EVEN: &[f64] = &[1.0];
+const UNEVEN: &[f64] = &[1.0, 2.0, 0.5, 0.5];
+
+/// The skin after 0.08 s in `n` steps.
+fn swing(scheme: &str, tissue: &str, lengths: &[f64], n: usize) -> Vec<f64> {
+    let mut sim = sim(&format!("{SWUNG}{tissue}[inertia]\nstart = \"rest\"\n{scheme}\n"));
+    sim.initialise().expect("rest");
+    let mut t = 0.0;
+    for k in 0..n {
+        let dt = 0.08 / n as f64 * lengths[k % lengths.len()];
+        t += dt;
+        let g = 20.0 * (30.0 * t).sin().powi(2);
+        set(&mut sim, "gravity", 0, &[g, 0.3 * g, 0.0]);
+        sim.step(dt).expect("a swing");
+    }
+    get(&sim, "skin.position")
+}
+
+fn order(scheme: &str, tissue: &str, lengths: &[f64]) -> f64 {
+    let x = [128, 256, 512].map(|n| swing(scheme, tissue, lengths, n));
+    let apart = |a: &[f64], b: &[f64]| largest(a.iter().zip(b).map(|(a, b)| a - b));
+    (apart(&x[0], &x[1]) / apart(&x[1], &x[2])).log2()
+}
+
+const SOFT: &str = "[[tissue]]\nenergy = \"stable-neo-hookean\"\nE = 3e3\nnu = 0.3\n";
+const VISCOUS: &str = "[tissue.viscous]\ng = [0.6]\ntau = [0.02]\n";
+
+#[test]
+fn each_scheme_shows_its_order() {
+    for (scheme, wanted) in SCHEMES {
+        for (tissue, lengths) in
+            [(SOFT.to_owned(), EVEN), (SOFT.to_owned(), UNEVEN), (format!("{SOFT}{VISCOUS}"), EVEN)]
+        {
+            let found = order(scheme, &tissue, lengths);
+            println!("{scheme} {lengths:?} {}: order {found:.3}", tissue.len());
+            assert!(
+                (found - wanted).abs() < 0.15,
+                "{scheme}, {lengths:?}: order {found:.3}, wanted {wanted}\n{tissue}"
+            );
+        }
+    }
+}
+
+#[test]
+#[should_panic]
+fn backward_euler_is_not_of_second_order() {
+    assert!((order(SCHEMES[0].0, SOFT, EVEN) - 2.0).abs() < 0.15);
+}
+
+/// Energy of a bar of the linear law that is plucked and left to ring: at the first free step, and after `n` more.
+fn ringing(scheme: &str, n: usize) -> [f64; 2] {
+    let text =
+        format!("{SWUNG}[[tissue]]\nenergy = \"linear\"\nE = 3e3\nnu = 0.3\n[inertia]\nstart = \"rest\"\n{scheme}\n");
+    let mut sim = sim(&text);
+    sim.initialise().expect("rest");
+    set(&mut sim, "bone.translation", 0, &[2e-3, 0.0, 0.0]);
+    let energy = |sim: &Sim| get(sim, "energy.elastic")[0] + get(sim, "energy.kinetic")[0];
+    (0..3).for_each(|_| drop(sim.step(1e-3).expect("a pluck")));
+    let first = energy(&sim);
+    (0..n).for_each(|_| drop(sim.step(1e-3).expect("ringing")));
+    [first, energy(&sim)]
+}
+
+#[test]
+fn the_midpoint_rule_keeps_the_energy_of_a_linear_problem() {
+    let [first, last] = ringing("scheme = \"implicit-midpoint\"", 1000);
+    assert!((last / first - 1.0).abs() < 1e-6, "{first:.6e} J became {last:.6e} J");
+    for (scheme, left) in
+        [("scheme = \"backward-euler\"", 0.2..0.5), ("scheme = \"generalised-alpha\"\nrho = 0.5", 0.8..0.9999)]
+    {
+        let [first, last] = ringing(scheme, 400);
+        assert!(left.contains(&(last / first)), "{scheme}: {first:.6e} J became {last:.6e} J");
+    }
+}
+
+#[test]
+fn every_scheme_repeats_its_bits() {
+    for (scheme, _) in SCHEMES {
+        // A force-driven bone as well: its curvature depends on where inertia carries it.
+        let scene = format!(
+            "{BAR}{scheme}\ndamping_mass = 2.0\n[[bone]]\nname = \"root\"\nnodes = \"z_min\"\n[[bone]]\nname = \"plate\"\n\
+             nodes = \"z_max\"\ndrive = \"force\"\n[gravity]\n"
+        );
+        let go = |sim: &mut Sim, k: usize| {
+            set(sim, "bone.force", 3, &[0.1 * (k as f64).sin(), 0.02, 0.0]);
+            sim.step([0.01, 0.004, 0.02][k % 3]).expect("a dynamic step");
+        };
+        let mut straight = sim(&scene);
+        straight.initialise().expect("rest");
+        (0..7).for_each(|k| go(&mut straight, k));
+        let bytes = straight.save().to_bytes(straight.model());
+        let mut other = sim(&scene);
+        let state = State::from_bytes(&bytes, other.model()).expect("bytes of the same model");
+        assert_eq!(state, straight.save());
+        other.restore(&state).expect("a state of the same model");
+        for sim in [&mut straight, &mut other] {
+            (7..15).for_each(|k| go(sim, k));
+        }
+        assert_eq!(straight.save().to_bytes(straight.model()), other.save().to_bytes(other.model()), "{scheme}");
+    }
+}
+
+#[test]
+fn bones_do_not_ring_in_any_scheme() {
+    // A bone that sets off evenly: the reaction of its tissue's mass is that of one jolt, then none.
+    for (scheme, _) in SCHEMES {
+        let mut sim = sim(&format!("{SWUNG}{SOFT}[inertia]\nstart = \"rest\"\n{scheme}\ndamping_mass = 5.0\n"));
+        sim.initialise().expect("rest");
+        let mut kinetic = Vec::new();
+        for k in 1..=400 {
+            set(&mut sim, "bone.translation", 0, &[2e-4 * f64::from(k), 0.0, 0.0]);
+            sim.step(2e-2).expect("an even motion");
+            kinetic.push(get(&sim, "energy.kinetic")[0]);
+        }
+        // All 16 g at 1 cm/s.
+        assert!((kinetic[399] - 0.5 * 0.016 * 1e-4).abs() < 1e-10, "{scheme}: {:e}", kinetic[399]);
+    }
+}
