@@ -7,6 +7,7 @@ mod inertia;
 mod load;
 mod muscle;
 mod pressure;
+mod rayleigh;
 mod tissue;
 mod viscous;
 
@@ -15,6 +16,7 @@ pub use inertia::{Inertia, lumped_masses};
 pub use load::DeadLoad;
 pub use muscle::{Muscle, nearest_on_path};
 pub use pressure::Pressure;
+pub use rayleigh::{damping_memory, stiffness_damping};
 pub use tissue::{Branches, Elements, LAWS, Law, law};
 pub use viscous::{Measure, Viscous};
 

@@ -209,6 +209,7 @@ pub struct InertiaSpec {
     pub scheme: Option<Spanned<String>>,
     pub rho: Option<Spanned<f64>>,
     pub damping_mass: Option<Spanned<f64>>,
+    pub damping_stiffness: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

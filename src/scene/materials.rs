@@ -4,8 +4,10 @@ use super::SceneError;
 use super::build::Builder;
 use super::file::{MuscleSpec, SceneFile, TissueSpec, ViscousSpec};
 use super::keys::find;
-use crate::effect::{self, Branches, Elements, Law, Muscle, nearest_on_path};
-use crate::energy::Lame;
+use crate::effect::{
+    self, Branches, Elements, Law, Measure, Muscle, damping_memory, nearest_on_path, stiffness_damping,
+};
+use crate::energy::{Energy, Lame, Linear};
 use crate::fem::Term;
 use crate::math::Vec3;
 use crate::mesh::TetMesh;
@@ -28,7 +30,7 @@ pub(super) fn stand_in(mesh: &TetMesh, midsides: &[[u32; 6]]) -> Vec<Box<dyn Ter
 }
 
 impl Builder<'_> {
-    /// One term for each material, its overstress if it has one, and the density of each region.
+    /// One term for each material, its overstress and damping if it has them, and the density of each region.
     pub(super) fn tissue(
         &self,
         file: &SceneFile,
@@ -59,6 +61,8 @@ impl Builder<'_> {
             return Err(self.text.at(file.mesh.span().start, message));
         }
         let (mut terms, mut n_history) = (Vec::new(), 0);
+        let beta = file.inertia.as_ref().and_then(|i| i.damping_stiffness.as_ref());
+        let beta = beta.map_or(Ok(0.0), |b| self.text.checked("inertia", "damping_stiffness", b))?;
         let mut density = vec![0.0; mesh.region_names.len()];
         for (k, spec) in file.tissue.iter().enumerate() {
             let (law, constants) = self.law(spec)?;
@@ -83,6 +87,12 @@ impl Builder<'_> {
                     let branches = Branches { series: self.series(spec)?, first: n_history };
                     n_history += branches.memory(&elements);
                     terms.push((law.viscous)(&constants, branches, elements));
+                }
+                if beta > 0.0 {
+                    let measure = if law.name == Linear::NAME { Measure::Small } else { Measure::Finite };
+                    let damped = Lame { mu: beta * mu, lambda: beta * lambda };
+                    terms.push(stiffness_damping(damped, measure, n_history, elements));
+                    n_history += damping_memory(&elements);
                 }
             }
         }

@@ -168,14 +168,16 @@ const VISCOUS: &str = "[tissue.viscous]\ng = [0.6]\ntau = [0.02]\n";
 #[test]
 fn each_scheme_shows_its_order() {
     for (scheme, wanted) in SCHEMES {
-        for (tissue, lengths) in
-            [(SOFT.to_owned(), EVEN), (SOFT.to_owned(), UNEVEN), (format!("{SOFT}{VISCOUS}"), EVEN)]
-        {
-            let found = order(scheme, &tissue, lengths);
-            println!("{scheme} {lengths:?} {}: order {found:.3}", tissue.len());
+        for (tissue, lengths, damping) in [
+            (SOFT.to_owned(), EVEN, ""),
+            (SOFT.to_owned(), UNEVEN, ""),
+            (SOFT.to_owned(), UNEVEN, "damping_mass = 5.0\ndamping_stiffness = 0.002"),
+            (format!("{SOFT}{VISCOUS}"), EVEN, ""),
+        ] {
+            let found = order(&format!("{scheme}\n{damping}"), &tissue, lengths);
             assert!(
                 (found - wanted).abs() < 0.15,
-                "{scheme}, {lengths:?}: order {found:.3}, wanted {wanted}\n{tissue}"
+                "{scheme}\n{damping}\n{tissue}{lengths:?}: order {found:.3}, wanted {wanted}"
             );
         }
     }
@@ -218,7 +220,7 @@ fn every_scheme_repeats_its_bits() {
     for (scheme, _) in SCHEMES {
         // A force-driven bone as well: its curvature depends on where inertia carries it.
         let scene = format!(
-            "{BAR}{scheme}\ndamping_mass = 2.0\n[[bone]]\nname = \"root\"\nnodes = \"z_min\"\n[[bone]]\nname = \"plate\"\n\
+            "{BAR}{scheme}\ndamping_mass = 2.0\ndamping_stiffness = 1e-3\n[[bone]]\nname = \"root\"\nnodes = \"z_min\"\n[[bone]]\nname = \"plate\"\n\
              nodes = \"z_max\"\ndrive = \"force\"\n[gravity]\n"
         );
         let go = |sim: &mut Sim, k: usize| {
@@ -244,7 +246,7 @@ fn every_scheme_repeats_its_bits() {
 fn bones_do_not_ring_in_any_scheme() {
     // A bone that sets off evenly: the reaction of its tissue's mass is that of one jolt, then none.
     for (scheme, _) in SCHEMES {
-        let mut sim = sim(&format!("{SWUNG}{SOFT}[inertia]\nstart = \"rest\"\n{scheme}\ndamping_mass = 5.0\n"));
+        let mut sim = sim(&format!("{SWUNG}{SOFT}[inertia]\nstart = \"rest\"\n{scheme}\ndamping_stiffness = 0.01\n"));
         sim.initialise().expect("rest");
         let mut kinetic = Vec::new();
         for k in 1..=400 {
@@ -255,4 +257,67 @@ fn bones_do_not_ring_in_any_scheme() {
         // All 16 g at 1 cm/s.
         assert!((kinetic[399] - 0.5 * 0.016 * 1e-4).abs() < 1e-10, "{scheme}: {:e}", kinetic[399]);
     }
+}
+
+/// Damping in units of the critical one and angular frequency (rad/s) of the slowest sway of a bar let go; its mesh is
+/// mirrored, so that it sways in one plane.
+fn sway(law: &str, damping: &str) -> (f64, f64) {
+    let mut sim = sim(&format!(
+        "[mesh.block]\nsize = [0.01, 0.01, 0.06]\ncells = [1, 1, 3]\npattern = \"forty-eight\"\n[solver]\ntolerance = 1e-10\n[[bone]]\n\
+         name = \"root\"\nnodes = \"z_min\"\n[gravity]\nacceleration = [0.2, 0, 0]\n[[tissue]]\nenergy = \"{law}\"\n\
+         E = 20e3\nnu = 0.3\n[inertia]\nstart = \"equilibrium\"\nscheme = \"bdf2\"\n{damping}\n"
+    ));
+    sim.initialise().expect("bent by gravity");
+    set(&mut sim, "gravity", 0, &[0.0; 3]);
+    let rest = get(&sim, "skin.restPosition");
+    let k = 3 * (0..rest.len() / 3).max_by(|a, b| rest[3 * a + 2].total_cmp(&rest[3 * b + 2])).expect("a tip");
+    let (dt, mut before, mut crossings) = (1e-3, 1.0, Vec::new());
+    for step in 0..20_000 {
+        sim.step(dt).expect("a sway");
+        let u = get(&sim, "skin.position")[k] - rest[k];
+        if before < 0.0 && u >= 0.0 {
+            crossings.push((dt * f64::from(step), get(&sim, "energy.elastic")[0] + get(&sim, "energy.kinetic")[0]));
+        }
+        before = u;
+        if crossings.len() == 11 {
+            break;
+        }
+    }
+    // The first ones hold faster motions, too. Energy decays twice as fast as motion.
+    let ((t0, e0), (t1, e1)) = (crossings[2], crossings[10]);
+    let (decay, w) = ((e0 / e1).ln() / 16.0, 8.0 * std::f64::consts::TAU / (t1 - t0));
+    (decay / decay.hypot(std::f64::consts::TAU), w)
+}
+
+#[test]
+fn rayleigh_damping_has_its_ratio() {
+    for law in ["linear", "stable-neo-hookean"] {
+        for (a, b) in [(0.8, 0.0), (0.0, 2e-3), (0.5, 1e-3)] {
+            let (zeta, w) = sway(law, &format!("damping_mass = {a:?}\ndamping_stiffness = {b:?}"));
+            let wanted = 0.5 * (a / w + b * w);
+            println!("{law}, a {a}, b {b}: w {w:.2} rad/s, zeta {zeta:.5}, formula {wanted:.5}");
+            assert!((zeta - wanted).abs() < 0.02 * wanted, "{law}, a {a}, b {b}: {zeta} against {wanted} at {w} rad/s");
+        }
+    }
+}
+
+#[test]
+fn stiffness_damping_feels_no_rotation() {
+    // A bar carried round by its bone: damping that felt rotations would hold it back and turn the bone's torque.
+    let torque = |damping: &str| {
+        let mut sim = sim(&format!(
+            "{SWUNG}[[tissue]]\nenergy = \"corotational\"\nE = 15e3\nnu = 0.3\n[inertia]\nstart = \"rest\"\nscheme = \"bdf2\"\n{damping}\n"
+        ));
+        sim.initialise().expect("rest");
+        let mut angle = 0.0;
+        for k in 0..600 {
+            angle += 0.01 * (f64::from(k) / 300.0).min(1.0);
+            set(&mut sim, "bone.rotation", 0, &[0.0, 0.0, angle]);
+            sim.step(0.01).expect("a turn");
+        }
+        get(&sim, "bone.reactionTorque")[2]
+    };
+    let (free, damped) = (torque(""), torque("damping_stiffness = 0.05"));
+    let felt = torque("damping_mass = 5.0");
+    assert!((free - damped).abs() < 1e-3 * (free - felt).abs(), "{free:e} {damped:e} {felt:e}");
 }
