@@ -18,6 +18,10 @@ use crate::solve::Strategy;
 const MEMORY: usize = 8;
 /// Iterations after which the quasi-Newton method factors anew.
 const REFRESH_AFTER: u32 = 20;
+/// Largest nodal motion of the last correction, m.
+const TOLERANCE: f64 = 1e-7;
+/// Round-off of the solver that the estimate of an error in time can bear, in units of its accuracy.
+const NOISE: f64 = 0.1;
 
 /// The model and programme of a scene `text` on its mesh.
 ///
@@ -98,6 +102,10 @@ impl Builder<'_> {
             start[input..input + 3].copy_from_slice(&g);
             terms.push(Box::new(Gravity { m: masses(), input }));
         }
+        let tolerance = match solver {
+            Some(s) => self.text.number("solver", "tolerance", &s.tolerance)?.unwrap_or(TOLERANCE),
+            None => TOLERANCE,
+        };
         let inertia = match inertia {
             Some(spec) => {
                 terms.push(Box::new(Inertia { m: masses() }));
@@ -107,6 +115,7 @@ impl Builder<'_> {
                     start_at_rest: start == "rest",
                     scheme: self.scheme(spec)?,
                     damping_mass: self.text.number("inertia", "damping_mass", &spec.damping_mass)?.unwrap_or(0.0),
+                    accuracy: self.accuracy(spec, tolerance)?,
                 })
             }
             None => None,
@@ -122,7 +131,6 @@ impl Builder<'_> {
         let spec = solver.as_ref();
         let newton =
             spec.map(|s| self.text.choice("solver", "method", &s.method)).transpose()?.flatten() == Some("newton");
-        let tolerance = spec.map(|s| self.text.number("solver", "tolerance", &s.tolerance)).transpose()?.flatten();
         let max_iterations = match spec.and_then(|s| s.max_iterations.as_ref()) {
             Some(n) if *n.get_ref() < 1 => {
                 return Err(self.text.out_of_range("solver", "max_iterations", n, n.get_ref()));
@@ -133,7 +141,7 @@ impl Builder<'_> {
         let strategy = Strategy {
             memory: if newton { 0 } else { MEMORY },
             refresh_after: if newton { 1 } else { REFRESH_AFTER },
-            tolerance: tolerance.unwrap_or(1e-7),
+            tolerance,
             max_iterations,
         };
         let model = Model::new(ModelParts {
@@ -165,6 +173,19 @@ impl Builder<'_> {
 }
 
 impl Builder<'_> {
+    fn accuracy(&self, spec: &InertiaSpec, tolerance: f64) -> Result<Option<f64>, SceneError> {
+        let Some(at) = &spec.accuracy else { return Ok(None) };
+        let accuracy = self.text.checked("inertia", "accuracy", at)?;
+        if tolerance > NOISE * accuracy {
+            let message = format!(
+                "`accuracy` is {accuracy:e} m, but positions are solved to {tolerance:e} m only: make it at least ten \
+                 times `tolerance` of [solver], or that smaller"
+            );
+            return Err(self.text.at(at.span().start, message));
+        }
+        Ok(Some(accuracy))
+    }
+
     fn scheme(&self, spec: &InertiaSpec) -> Result<Scheme, SceneError> {
         let name = self.text.choice("inertia", "scheme", &spec.scheme)?;
         let rho = self.text.number("inertia", "rho", &spec.rho)?;

@@ -210,6 +210,7 @@ pub struct InertiaSpec {
     pub rho: Option<Spanned<f64>>,
     pub damping_mass: Option<Spanned<f64>>,
     pub damping_stiffness: Option<Spanned<f64>>,
+    pub accuracy: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -166,6 +166,7 @@ pub const KEYS: &[Key] = &[
     key("inertia", "rho", "float", "", From(0.0, 1.0 + f64::EPSILON), "0.8", "What a step of `generalised-alpha` leaves of the fastest motions."),
     key("inertia", "damping_mass", "float", "1/s", NonNegative, "0", "Damping force in units of mass times velocity."),
     key("inertia", "damping_stiffness", "float", "s", NonNegative, "0", "Damping stress in units of the small-strain stiffness times strain rate; rotations feel nothing."),
+    key("inertia", "accuracy", "float", "m", Positive, "none", "Cuts each step into as many pieces (256 at most) as keep the estimated error of a piece below this; at least ten times the solver's `tolerance`."),
     key("attachment", "free_rings", "integer", "", NonNegative, "0", "Bone nodes that two bones claim, or within this many edges of another bone, are set free (osteotomy lines, joints)."),
     key("solver", "method", "string", "", OneOf(&["quasi-newton", "newton"]), "\"quasi-newton\"", "L-BFGS over a kept factor, or Newton with a new factor in every iteration."),
     key("solver", "tolerance", "float", "m", Positive, "1e-7", "Largest nodal motion of the last correction."),

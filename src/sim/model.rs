@@ -67,6 +67,8 @@ pub struct Inertia {
     pub scheme: Scheme,
     /// Damping in proportion to the mass, 1/s.
     pub damping_mass: f64,
+    /// Largest estimated error of a piece of a step, m; steps are not cut for it if there is none.
+    pub accuracy: Option<f64>,
 }
 
 /// Makes terms of all elements in a law that is defined everywhere and whose only rest is untangled.

@@ -400,4 +400,29 @@ mod tests {
             }
         }
     }
+
+    /// Estimated and true error of one step from values that are exact.
+    fn local_errors(scheme: Scheme, t: f64, dt: f64, dt_before: f64) -> (f64, f64) {
+        let (x, v) = (|t: f64| t.cos() * Vec3::x(), |t: f64| -t.sin() * Vec3::x());
+        let memory = match scheme {
+            Scheme::GeneralisedAlpha { rho } => [-x(t), (rho - 1.0) / (rho + 1.0) * -v(t)],
+            _ => [x(t - dt_before), v(t - dt_before)],
+        };
+        let past = Past { x: x(t), v: v(t), memory };
+        let formula = scheme.formula(dt, dt_before);
+        let k = formula.coefficient(0.0);
+        let found = k * formula.x_tilde(&past, 0.0) / (k + 1.0);
+        (formula.error(&past, &found).norm(), (found - x(t + dt)).norm())
+    }
+
+    #[test]
+    fn errors_are_estimated_as_they_are() {
+        for scheme in SCHEMES {
+            for (dt, dt_before) in [(0.02, 0.02), (0.02, 0.03), (0.03, 0.02)] {
+                let (estimate, truth) = local_errors(scheme, 0.8, dt, dt_before);
+                let ratio = estimate / truth;
+                assert!((0.9..1.1).contains(&ratio), "{scheme:?}, {dt}: estimated {estimate:e}, true {truth:e}");
+            }
+        }
+    }
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::model::{Drive, Model};
 use super::motion::Motion;
+use super::pace::{Pace, even_part};
 use super::recover::untangle;
 use super::scheme::Scheme;
 use super::start::accelerations;
@@ -21,6 +22,8 @@ use crate::solve::{Minimiser, Outcome, Problem};
 const SMALLEST_PIECE: f64 = 1.0 / 64.0;
 /// A piece that turns elements inside out is cut, down to this part of the step; then it is taken and told.
 const SMALLEST_TO_AVOID_INVERSION: f64 = 1.0 / 8.0;
+/// What is left of a step that is no further piece.
+const ROUND_OFF: f64 = 1e-9;
 /// Most linear solves of a whole step, in units of `solver.max_iterations`.
 const BUDGET: u32 = 4;
 /// After a piece that succeeded the next one may be this much larger.
@@ -43,6 +46,8 @@ pub struct StepReport {
     pub factorisations: u32,
     /// Pieces the step was cut into; 1 if it went in one.
     pub substeps: u32,
+    /// Largest estimated error in time of a piece, m; 0 without `[inertia] accuracy`.
+    pub time_error: f64,
     /// Norm of the force residual, N.
     pub residual: f64,
     /// Largest nodal motion of the last correction, m.
@@ -68,6 +73,8 @@ pub(super) struct Workspace {
     /// Where the piece at hand started from.
     before: Configuration,
     motion: Motion,
+    /// Estimated error in time of the last piece, m.
+    time_error: f64,
     /// What terms remember, and where the next memory is written.
     history: Vec<f64>,
     remembered: Vec<f64>,
@@ -98,6 +105,7 @@ impl Workspace {
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             before: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             motion: Motion::still(X.len(), parts.inertia.as_ref()),
+            time_error: 0.0,
             history: vec![0.0; parts.n_history],
             remembered: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
@@ -158,9 +166,15 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     work.history.copy_from_slice(&state.history);
     let mut report = StepReport::new(0);
     let mut linearisation = state.linearisation.clone();
+    let pace = Pace::of(model.parts().inertia.as_ref()).filter(|_| dt > 0.0);
+    let smallest = if pace.is_some() { Pace::SMALLEST } else { SMALLEST_PIECE };
     let (mut done, mut piece) = (0.0, 1.0);
+    if pace.is_some() && state.motion.next_dt > 0.0 {
+        piece = even_part(1.0, (state.motion.next_dt / dt).max(smallest));
+    }
+    let mut spent_before = 0;
     while done < 1.0 {
-        let to: f64 = if done + piece >= 1.0 { 1.0 } else { done + piece };
+        let to: f64 = if done + piece >= 1.0 - ROUND_OFF { 1.0 } else { done + piece };
         for ((now, from), last) in work.inputs.iter_mut().zip(&state.applied).zip(&state.inputs) {
             *now = if to == 1.0 { *last } else { from + to * (last - from) };
         }
@@ -169,18 +183,33 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
         work.before.copy_from(&work.config);
         let linearised_before = linearisation.clone();
         let t = state.t + to * dt;
-        match step_piece(model, work, &mut linearisation, t, dt * (to - done), to - done, &mut report) {
+        let bound = pace.filter(|_| to - done > smallest);
+        match step_piece(model, work, &mut linearisation, t, dt * (to - done), to - done, bound, &mut report) {
             Ok(()) => {
                 report.substeps += 1;
                 piece = GROWTH * (to - done);
+                if let Some(pace) = &pace {
+                    let error = work.time_error;
+                    report.time_error = report.time_error.max(error);
+                    piece = ((to - done) * pace.next(error)).max(smallest);
+                    work.motion.next_dt = dt * piece;
+                    piece = even_part(1.0 - to, piece);
+                    spent_before = report.iterations;
+                }
                 done = to;
             }
-            Err(source) => {
+            Err(Setback::Coarse(factor)) => {
+                work.config.copy_from(&work.before);
+                linearisation = linearised_before;
+                piece = even_part(1.0 - done, (factor * (to - done)).max(smallest));
+            }
+            Err(Setback::Failed(source)) => {
                 work.config.copy_from(&work.before);
                 linearisation = linearised_before;
                 piece = 0.5 * (to - done);
                 report.iterations += source.iterations();
-                if piece < SMALLEST_PIECE || report.iterations > BUDGET * model.parts().strategy.max_iterations {
+                let spent = report.iterations - spent_before;
+                if piece < smallest || spent > BUDGET * model.parts().strategy.max_iterations {
                     let cuts = (1.0 / (to - done)).round() as u32;
                     return Err(SimError::Solve { t: state.t, dt, cuts, spent: report.iterations, source });
                 }
@@ -191,6 +220,9 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     let strain = strain_of(model, &at, &work.config.x);
     if strain.min_det_f <= 0.0 && state.outputs.min_det_f > 0.0 {
         report.warnings.push(format!("elements are turned inside out (smallest det F {:.3})", strain.min_det_f));
+    }
+    if let Some(pace) = pace.filter(|pace| !pace.holds(report.time_error)) {
+        report.warnings.push(pace.broken(report.time_error));
     }
     warn_of_jumps(model, &state.config, &work.config, &mut report);
     state.t += dt;
@@ -213,6 +245,7 @@ impl StepReport {
             iterations: 0,
             factorisations: 0,
             substeps,
+            time_error: 0.0,
             residual: 0.0,
             correction: 0.0,
             converged: true,
@@ -231,7 +264,22 @@ impl StepReport {
     }
 }
 
-/// One piece of a step, from and into `work`.
+/// Why a piece of a step is not taken.
+enum Setback {
+    /// It has no answer.
+    Failed(SolveError),
+    /// It should be cut to this part of it for the sake of accuracy.
+    Coarse(f64),
+}
+
+impl From<SolveError> for Setback {
+    fn from(source: SolveError) -> Setback {
+        Setback::Failed(source)
+    }
+}
+
+/// One piece of a step, from and into `work`; `bound` by an accuracy if it may still be cut.
+#[allow(clippy::too_many_arguments)] // the time, its length and its part of the step are three facts
 fn step_piece(
     model: &Model,
     work: &mut Workspace,
@@ -239,8 +287,9 @@ fn step_piece(
     t: f64,
     dt: f64,
     piece: f64,
+    bound: Option<Pace>,
     report: &mut StepReport,
-) -> Result<(), SolveError> {
+) -> Result<(), Setback> {
     let parts = model.parts();
     let dofs = model.dofs();
     let Workspace {
@@ -249,6 +298,7 @@ fn step_piece(
         config,
         before,
         motion,
+        time_error,
         history,
         remembered,
         inputs,
@@ -304,7 +354,15 @@ fn step_piece(
     let avoid_inversion = piece > SMALLEST_TO_AVOID_INVERSION && !problem.is_quadratic();
     if avoid_inversion && is_inverted(&config.x) && !inverted_before() {
         *factored = None;
-        return Err(SolveError::Inverts);
+        return Err(SolveError::Inverts.into());
+    }
+    if parts.inertia.as_ref().is_some_and(|i| i.accuracy.is_some()) {
+        let error = formula.as_ref().map_or(0.0, |(_, formula)| motion.error(formula, dofs, before, config));
+        if let Some(pace) = bound.filter(|pace| !pace.holds(error)) {
+            *factored = None;
+            return Err(Setback::Coarse(pace.next(error)));
+        }
+        *time_error = error;
     }
     if outcome.factorisations > 0 {
         let made = Linearisation {

@@ -321,3 +321,77 @@ fn stiffness_damping_feels_no_rotation() {
     let felt = torque("damping_mass = 5.0");
     assert!((free - damped).abs() < 1e-3 * (free - felt).abs(), "{free:e} {damped:e} {felt:e}");
 }
+
+/// A bar that is jerked, then left to itself: skin after every host step of 0.02 s, and all pieces of time taken.
+fn jerked(inertia: &str, cuts: u32) -> (Vec<Vec<f64>>, u32, f64) {
+    let mut sim = sim(&format!("{SWUNG}{SOFT}[inertia]\nstart = \"rest\"\ndamping_mass = 8.0\n{inertia}\n"));
+    sim.initialise().expect("rest");
+    let (mut skins, mut pieces, mut worst) = (Vec::new(), 0, 0.0_f64);
+    for k in 0..50 {
+        for cut in 1..=cuts {
+            let t = (f64::from(k) + f64::from(cut) / f64::from(cuts)) / 2.0;
+            set(&mut sim, "bone.translation", 0, &[4e-3 * t.min(1.0), 0.0, 0.0]);
+            let report = sim.step(0.02 / f64::from(cuts)).expect("a step");
+            assert!(report.warnings.is_empty(), "{:?}", report.warnings);
+            pieces += report.substeps;
+            worst = worst.max(report.time_error);
+        }
+        skins.push(get(&sim, "skin.position"));
+    }
+    (skins, pieces, worst)
+}
+
+fn farthest(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    largest(a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a - b))
+}
+
+#[test]
+fn steps_are_cut_as_accuracy_asks() {
+    let truth = jerked("scheme = \"generalised-alpha\"", 256).0;
+    for (scheme, _) in &SCHEMES[..4] {
+        let mut errors = Vec::new();
+        for accuracy in [8e-6, 1e-6] {
+            let (skins, pieces, worst) = jerked(&format!("{scheme}\naccuracy = {accuracy:e}"), 1);
+            assert!(worst <= accuracy, "{scheme}: a piece of error {worst:e}");
+            let error = farthest(&skins, &truth);
+            let even = farthest(&jerked(scheme, pieces.div_ceil(50)).0, &truth);
+            println!(
+                "{scheme}, accuracy {accuracy:e}: {pieces} pieces, off by {error:.1e} m, even ones by {even:.1e} m"
+            );
+            // Each piece adds its own error, and time is spent where it is needed.
+            assert!(error < f64::from(pieces) * accuracy, "{scheme}, {accuracy:e}: off by {error:e} m");
+            assert!(error < even, "{scheme}, {accuracy:e}: {error:e} m, even pieces {even:e} m");
+            errors.push(error);
+        }
+        assert!(errors[1] < 0.5 * errors[0], "{scheme}: {errors:?}");
+    }
+}
+
+#[test]
+fn accuracy_repeats_its_bits_and_is_told_where_it_fails() {
+    let scene = format!("{SWUNG}{SOFT}[inertia]\nstart = \"rest\"\nscheme = \"bdf2\"\naccuracy = 1e-6\n");
+    let go = |sim: &mut Sim, k: usize| {
+        set(sim, "bone.translation", 0, &[2e-3 * (k as f64).sin(), 0.0, 0.0]);
+        sim.step(0.02).expect("a step")
+    };
+    let mut straight = sim(&scene);
+    straight.initialise().expect("rest");
+    let pieces: u32 = (0..6).map(|k| go(&mut straight, k).substeps).sum();
+    assert!(pieces > 12, "{pieces} pieces");
+    let bytes = straight.save().to_bytes(straight.model());
+    let mut other = sim(&scene);
+    other.restore(&State::from_bytes(&bytes, other.model()).expect("its bytes")).expect("its state");
+    for sim in [&mut straight, &mut other] {
+        (6..12).for_each(|k| drop(go(sim, k)));
+    }
+    assert_eq!(straight.save().to_bytes(straight.model()), other.save().to_bytes(other.model()));
+
+    let mut rough = sim(&scene.replace("1e-6", "1e-9"));
+    rough.initialise().expect("rest");
+    set(&mut rough, "bone.translation", 0, &[5e-3, 0.0, 0.0]);
+    let report = rough.step(0.5).expect("a step that is too long");
+    assert!(report.substeps <= 512 && report.warnings.iter().any(|w| w.contains("accuracy")), "{report:?}");
+    let coarse = format!("{SWUNG}{SOFT}[inertia]\naccuracy = 5e-11\n");
+    let message = cutis::load::from_text(&coarse, None).err().expect("below the solver's tolerance").to_string();
+    assert!(message.contains("accuracy") && message.contains("ten times"), "{message}");
+}
