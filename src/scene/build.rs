@@ -138,11 +138,13 @@ impl Builder<'_> {
             Some(n) => *n.get_ref(),
             None => 200,
         };
+        let inversion = spec.map(|s| self.text.choice("solver", "inversion", &s.inversion)).transpose()?.flatten();
         let strategy = Strategy {
             memory: if newton { 0 } else { MEMORY },
             refresh_after: if newton { 1 } else { REFRESH_AFTER },
             tolerance,
             max_iterations,
+            without: None,
         };
         let model = Model::new(ModelParts {
             name: name.clone().unwrap_or_else(|| "scene".into()),
@@ -159,6 +161,7 @@ impl Builder<'_> {
             inertia,
             layout,
             start,
+            may_invert: inversion == Some("allow"),
             strategy,
             identity: without_mesh_table(self.text.0),
             warnings,

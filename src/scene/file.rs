@@ -225,6 +225,7 @@ pub struct SolverSpec {
     pub method: Option<Spanned<String>>,
     pub tolerance: Option<Spanned<f64>>,
     pub max_iterations: Option<Spanned<u32>>,
+    pub inversion: Option<Spanned<String>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

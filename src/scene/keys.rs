@@ -171,6 +171,7 @@ pub const KEYS: &[Key] = &[
     key("solver", "method", "string", "", OneOf(&["quasi-newton", "newton"]), "\"quasi-newton\"", "L-BFGS over a kept factor, or Newton with a new factor in every iteration."),
     key("solver", "tolerance", "float", "m", Positive, "1e-7", "Largest nodal motion of the last correction."),
     key("solver", "max_iterations", "integer", "", AtLeastOne, "200", "Most linear solves in one piece of a step."),
+    key("solver", "inversion", "string", "", OneOf(&["refuse", "allow"]), "\"refuse\"", "Whether a step that can only end with elements turned inside out is refused, or taken and told where the law has an energy for it (`linear` tissue alone always may)."),
     key("run", "dt", "float", "s", Positive, "0.1", "Length of a step."),
     key("run", "end", "float", "s", Positive, "1", "End time."),
     key("keyframe", "t", "float", "s", NonNegative, "required", "Time."),

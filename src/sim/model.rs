@@ -8,7 +8,7 @@ use crate::fem::{Dofs, Term};
 use crate::math::{Mat3, Vec3, svd};
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::Port;
-use crate::solve::Strategy;
+use crate::solve::{Rung, Strategy};
 
 /// How a bone moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,6 +104,8 @@ pub struct ModelParts {
     pub layout: Layout,
     /// Start values of all inputs.
     pub start: Vec<f64>,
+    /// Whether a step may turn elements inside out where their law has an energy for it.
+    pub may_invert: bool,
     /// How the minimum is sought.
     pub strategy: Strategy,
     /// Text that, with the mesh and the ports, identifies the model (the scene).
@@ -175,6 +177,12 @@ impl Model {
         }
         let token = token(&parts, &ports);
         Ok(Model { parts, ports, dofs, skin, triangles, osteotomy, token })
+    }
+
+    /// The same without one rung of recovery, to measure what it buys.
+    pub fn without(mut self, rung: Rung) -> Model {
+        self.parts.strategy.without = Some(rung);
+        self
     }
 
     /// Name of the scene.

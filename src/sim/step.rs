@@ -16,11 +16,11 @@ use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
 use crate::math::{Mat3, Pose, Vec3, best_fit};
 use crate::port::Slot;
-use crate::solve::{Minimiser, Outcome, Problem};
+use crate::solve::{Minimiser, Outcome, Problem, Rung};
 
 /// A step is cut into pieces no smaller than this part of it.
 const SMALLEST_PIECE: f64 = 1.0 / 64.0;
-/// A piece that turns elements inside out is cut, down to this part of the step; then it is taken and told.
+/// A piece that turns elements inside out is cut; where the scene allows them, down to this part of the step only.
 const SMALLEST_TO_AVOID_INVERSION: f64 = 1.0 / 8.0;
 /// What is left of a step that is no further piece.
 const ROUND_OFF: f64 = 1e-9;
@@ -209,7 +209,10 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
                 piece = 0.5 * (to - done);
                 report.iterations += source.iterations();
                 let spent = report.iterations - spent_before;
-                if piece < smallest || spent > BUDGET * model.parts().strategy.max_iterations {
+                if piece < smallest
+                    || !model.parts().strategy.has(Rung::Pieces)
+                    || spent > BUDGET * model.parts().strategy.max_iterations
+                {
                     let cuts = (1.0 / (to - done)).round() as u32;
                     return Err(SimError::Solve { t: state.t, dt, cuts, spent: report.iterations, source });
                 }
@@ -291,6 +294,7 @@ fn step_piece(
     report: &mut StepReport,
 ) -> Result<(), Setback> {
     let parts = model.parts();
+    let strategy = &parts.strategy;
     let dofs = model.dofs();
     let Workspace {
         minimiser,
@@ -310,7 +314,8 @@ fn step_piece(
     let at = At { t, dt, inputs, history, ..At::NOWHERE };
     let is_inverted = |x: &[Vec3]| strain_of(model, &at, x).min_det_f <= 0.0;
     // A start that no step has led to may be tangled.
-    let untangled = linearisation.is_none() && !model.is_quadratic() && is_inverted(&config.x);
+    let untangled =
+        linearisation.is_none() && !model.is_quadratic() && strategy.has(Rung::StandIn) && is_inverted(&config.x);
     let mut still_tangled = false;
     if untangled {
         let outcome = untangle(model, pivots, config)?;
@@ -330,7 +335,7 @@ fn step_piece(
     let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
     restore_factor(model, &problem, motion.dt, minimiser, factored, linearisation, config, report)?;
     if !problem.is_quadratic() {
-        if dt == 0.0 || parts.inertia.is_none() {
+        if (dt == 0.0 || parts.inertia.is_none()) && strategy.has(Rung::RigidMotion) {
             move_along(dofs.prescribed.as_slice(), config, u);
         }
         minimiser.set_frame(frame(factored.as_deref(), config));
@@ -351,7 +356,9 @@ fn step_piece(
     let outcome = outcome.inspect_err(|_| *factored = None)?;
     report.count(&outcome);
     let inverted_before = || if untangled { still_tangled } else { is_inverted(&before.x) };
-    let avoid_inversion = piece > SMALLEST_TO_AVOID_INVERSION && !problem.is_quadratic();
+    let avoid_inversion = !problem.is_quadratic()
+        && strategy.has(Rung::Inversion)
+        && (!parts.may_invert || piece > SMALLEST_TO_AVOID_INVERSION);
     if avoid_inversion && is_inverted(&config.x) && !inverted_before() {
         *factored = None;
         return Err(SolveError::Inverts.into());
