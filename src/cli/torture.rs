@@ -1,6 +1,7 @@
 //! `cutis torture`: how the hard cases end.
 
-use cutis::torture::{Outcome, Row, catalogue};
+use cutis::solve::Rung;
+use cutis::torture::{Case, Outcome, Row, catalogue};
 
 #[derive(clap::Args)]
 pub struct Torture {
@@ -9,12 +10,19 @@ pub struct Torture {
     /// Print the table as Markdown, without times
     #[arg(long)]
     markdown: bool,
+    /// Run the catalogue without each rung of recovery in turn and say what that costs
+    #[arg(long, conflicts_with = "markdown")]
+    ablate: bool,
 }
 
 impl Torture {
     pub fn run(self) -> super::Done {
         let wanted = self.case.unwrap_or_default();
         let cases = || catalogue().filter(|c| c.name.contains(&wanted));
+        if self.ablate {
+            ablate(&cases().collect::<Vec<_>>());
+            return Ok(());
+        }
         if self.markdown {
             cases().for_each(|c| println!("- `{}`: {}", c.name, c.what));
             println!("\n| case | law | outcome | solves | worst det F | energy (J) | said |");
@@ -40,6 +48,34 @@ impl Torture {
             _ => Err(format!("{failed} of {n_rows} rows failed").into()),
         }
     }
+}
+
+/// For each rung: rows lost without it, and linear solves of the rows that end well with and without.
+fn ablate(cases: &[&'static Case]) {
+    let run = |rung| cases.iter().flat_map(|c| c.rows_without(rung)).collect::<Vec<Row>>();
+    let all = run(None);
+    println!("| without | rows lost | solves | of the worst row | lost |\n| --- | --- | --- | --- | --- |");
+    for (name, rung) in Rung::ALL {
+        let rows = run(Some(rung));
+        let pairs = || all.iter().zip(&rows);
+        let lost: Vec<String> = pairs()
+            .filter(|(a, b)| !a.fails() && is_lost(a, b))
+            .map(|(a, _)| format!("{} ({})", a.case, a.law))
+            .collect();
+        let kept = || pairs().filter(|(a, b)| !a.fails() && !is_lost(a, b));
+        let solves = |row: &Row| f64::from(row.tally.iterations);
+        let (with, without): (f64, f64) = (kept().map(|(a, _)| solves(a)).sum(), kept().map(|(_, b)| solves(b)).sum());
+        let more = 100.0 * (without / with - 1.0);
+        let times = |(a, b): &(&Row, &Row)| solves(b) / solves(a).max(1.0);
+        let worst = kept().max_by(|p, q| times(p).total_cmp(&times(q)));
+        let worst = worst.map_or(String::new(), |p| format!("x {:.1}: {} ({})", times(&p), p.0.case, p.0.law));
+        println!("| {name} | {} of {} | {more:+.1} % | {worst} | {} |", lost.len(), rows.len(), lost.join(", "));
+    }
+}
+
+/// Whether a row that ends well with all rungs ends worse without one: in a failure, or refused instead of answered.
+fn is_lost(with: &Row, without: &Row) -> bool {
+    without.fails() || matches!(without.outcome, Outcome::Refused(_)) && !matches!(with.outcome, Outcome::Refused(_))
 }
 
 fn plain(row: &Row) {

@@ -1,11 +1,13 @@
 //! Inertia as a term of the step's energy, with lumped masses.
 //!
 //! ```text
-//! W = 1/(2 dt^2) sum_a m_a |x_a - x_tilde_a|^2,   x_tilde = x_n + dt v_n   (backward Euler)
+//! W = k/2 sum_a m_a |x_a - x_tilde_a|^2
 //! ```
 //!
+//! The scheme of the scene says what k (1/s2) and x_tilde are, mass damping included; for backward Euler without damping
+//! `k = 1/dt^2`, `x_tilde = x_n + dt v_n`. It is silent while the start equilibrium is sought (k = 0).
+//!
 //! Source: Martin, Thomaszewski, Grinspun & Gross, "Example-based elastic materials", ACM TOG 30(4), 2011, section 4.
-//! It is silent while the start equilibrium is sought (dt = 0).
 
 use crate::fem::{At, Curvature, HessianSink, Term};
 use crate::math::{Mat3, Vec3};
@@ -41,18 +43,18 @@ impl Term for Inertia {
         "inertia"
     }
     fn energy(&self, at: &At, x: &[Vec3]) -> f64 {
-        if at.dt == 0.0 {
+        if at.inertia == 0.0 {
             return 0.0;
         }
         let sum: f64 = self.m.iter().zip(x).zip(at.x_tilde).map(|((m, x), y)| m * (x - y).norm_squared()).sum();
-        sum / (2.0 * at.dt * at.dt)
+        0.5 * at.inertia * sum
     }
     fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
-        if at.dt == 0.0 {
+        if at.inertia == 0.0 {
             return 0.0;
         }
         for (((m, x), y), g) in self.m.iter().zip(x).zip(at.x_tilde).zip(g) {
-            *g += (m / (at.dt * at.dt)) * (x - y);
+            *g += at.inertia * m * (x - y);
         }
         self.energy(at, x)
     }
@@ -62,9 +64,8 @@ impl Term for Inertia {
         }
     }
     fn add_hessian(&self, at: &At, _x: &[Vec3], _curvature: Curvature, sink: &mut dyn HessianSink) {
-        let scale = if at.dt == 0.0 { 0.0 } else { 1.0 / (at.dt * at.dt) };
         for (a, m) in self.m.iter().enumerate() {
-            sink.add(&[a as u32], &[scale * m * Mat3::identity()]);
+            sink.add(&[a as u32], &[at.inertia * m * Mat3::identity()]);
         }
     }
     fn is_quadratic(&self) -> bool {

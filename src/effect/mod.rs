@@ -13,6 +13,7 @@ mod muscle;
 mod nodal_pressure;
 mod pressure;
 mod prestress;
+mod rayleigh;
 mod tissue;
 mod viscous;
 
@@ -27,6 +28,7 @@ pub use muscle::{Muscle, nearest_on_path};
 pub use nodal_pressure::{NodalPressure, Volume};
 pub use pressure::Pressure;
 pub use prestress::{Balance, Prestress};
+pub use rayleigh::{damping_memory, stiffness_damping};
 pub use tissue::{Branches, Elements, LAWS, Law, law};
 pub use viscous::{Measure, Viscous};
 

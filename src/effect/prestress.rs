@@ -57,7 +57,7 @@ impl Balance {
     /// What holds the rest positions `X` against `term`.
     pub fn of(term: &dyn Term, X: &[Vec3]) -> Balance {
         let mut f = vec![Vec3::zeros(); X.len()];
-        term.add_gradient(&At::rest(), X, &mut f);
+        term.add_gradient(&At::NOWHERE, X, &mut f);
         Balance { f, X: X.to_vec() }
     }
 }

@@ -18,7 +18,7 @@ use crate::fem::{At, Material};
 use crate::math::{Mat3, Mat9};
 
 /// Numbers of a symmetric stress.
-const SYMMETRIC: usize = 6;
+pub(super) const SYMMETRIC: usize = 6;
 
 /// Where strain is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,16 +76,27 @@ impl<M: Energy> Viscous<M> {
     }
 }
 
+/// Adds d(F T)/dF at a fixed T.
+pub(super) fn add_stress(H: &mut Mat9, T: &Mat3) {
+    for j in 0..3 {
+        for l in 0..3 {
+            for i in 0..3 {
+                H[(i + 3 * j, i + 3 * l)] += T[(l, j)];
+            }
+        }
+    }
+}
+
 /// (1 - exp(-a))/a.
 fn mean_decay(a: f64) -> f64 {
     if a < 1e-8 { 1.0 - 0.5 * a } else { -(-a).exp_m1() / a }
 }
 
-fn unpack(s: &[f64]) -> Mat3 {
+pub(super) fn unpack(s: &[f64]) -> Mat3 {
     Mat3::new(s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2])
 }
 
-fn pack(S: &Mat3, to: &mut [f64]) {
+pub(super) fn pack(S: &Mat3, to: &mut [f64]) {
     let off = |i: usize, j: usize| 0.5 * (S[(i, j)] + S[(j, i)]);
     to.copy_from_slice(&[S[(0, 0)], S[(1, 1)], S[(2, 2)], off(0, 1), off(1, 2), off(0, 2)]);
 }
@@ -118,14 +129,7 @@ impl<M: Energy> Material for Viscous<M> {
         }
         let mut H = self.gamma(at.dt) * self.iso.dPdF(F);
         if self.measure == Measure::Finite {
-            let T = self.memory(at.dt, p, at.history);
-            for j in 0..3 {
-                for l in 0..3 {
-                    for i in 0..3 {
-                        H[(i + 3 * j, i + 3 * l)] += T[(l, j)];
-                    }
-                }
-            }
+            add_stress(&mut H, &self.memory(at.dt, p, at.history));
         }
         H
     }

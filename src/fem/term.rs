@@ -1,5 +1,6 @@
 //! Terms: the summands of the energy that a step minimises, and the crate's only gather/scatter loop.
 
+use super::Difference;
 use crate::math::{Mat3, Vec3};
 
 /// Everything a term sees besides the positions it is evaluated at.
@@ -11,6 +12,10 @@ pub struct At<'a> {
     pub dt: f64,
     /// All input values; a term knows where its own lie.
     pub inputs: &'a [f64],
+    /// Coefficient of the inertia term, 1/s2; 0 where no time passes.
+    pub inertia: f64,
+    /// How the scheme makes rates of remembered values.
+    pub difference: Difference,
     /// Where inertia alone would carry each node, m; empty in quasi-static scenes.
     pub x_tilde: &'a [Vec3],
     /// What terms remember of the steps before; a term knows where its own lies.
@@ -20,10 +25,17 @@ pub struct At<'a> {
 }
 
 impl At<'_> {
-    /// At rest, with no time, input or past.
-    pub fn rest() -> Self {
-        At { t: 0.0, dt: 0.0, inputs: &[], x_tilde: &[], history: &[], x_lag: &[] }
-    }
+    /// Where no time passes and nothing is remembered, set or moved.
+    pub const NOWHERE: At<'static> = At {
+        t: 0.0,
+        dt: 0.0,
+        inputs: &[],
+        inertia: 0.0,
+        difference: Difference::STILL,
+        x_tilde: &[],
+        history: &[],
+        x_lag: &[],
+    };
 }
 
 /// Which Hessian is asked for.

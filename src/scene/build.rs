@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::bones::free_rings;
 use super::check::Text;
-use super::file::SceneFile;
+use super::file::{InertiaSpec, SceneFile};
 use super::materials::{Tissue, stand_in};
 use super::place::nearest_point;
 use super::programme::Programme;
@@ -11,13 +11,17 @@ use crate::effect::{Gravity, Inertia, lumped_masses};
 use crate::fem::add_midsides;
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::Slot;
-use crate::sim::{self, Drive, Layout, Marker, Model, ModelParts};
+use crate::sim::{self, Drive, Layout, Marker, Model, ModelParts, Scheme};
 use crate::solve::Strategy;
 
 /// Pairs that the quasi-Newton method remembers.
 const MEMORY: usize = 8;
 /// Iterations after which the quasi-Newton method factors anew.
 const REFRESH_AFTER: u32 = 20;
+/// Largest nodal motion of the last correction, m.
+const TOLERANCE: f64 = 1e-7;
+/// Round-off of the solver that the estimate of an error in time can bear, in units of its accuracy.
+const NOISE: f64 = 0.1;
 
 /// The model and programme of a scene `text` on its mesh.
 ///
@@ -114,11 +118,21 @@ impl Builder<'_> {
             let scan = self.text.triple("gravity", "scan", &spec.scan)?.filter(|_| differential);
             terms.push(Box::new(Gravity { m: masses(), input, scan: scan.unwrap_or_default().into() }));
         }
+        let tolerance = match solver {
+            Some(s) => self.text.number("solver", "tolerance", &s.tolerance)?.unwrap_or(TOLERANCE),
+            None => TOLERANCE,
+        };
         let inertia = match inertia {
             Some(spec) => {
                 terms.push(Box::new(Inertia { m: masses() }));
                 let start = self.text.choice("inertia", "start", &spec.start)?.unwrap_or("equilibrium");
-                Some(sim::Inertia { m: masses(), start_at_rest: start == "rest" })
+                Some(sim::Inertia {
+                    m: masses(),
+                    start_at_rest: start == "rest",
+                    scheme: self.scheme(spec)?,
+                    damping_mass: self.text.number("inertia", "damping_mass", &spec.damping_mass)?.unwrap_or(0.0),
+                    accuracy: self.accuracy(spec, tolerance)?,
+                })
             }
             None => None,
         };
@@ -133,7 +147,6 @@ impl Builder<'_> {
         let spec = solver.as_ref();
         let newton =
             spec.map(|s| self.text.choice("solver", "method", &s.method)).transpose()?.flatten() == Some("newton");
-        let tolerance = spec.map(|s| self.text.number("solver", "tolerance", &s.tolerance)).transpose()?.flatten();
         let max_iterations = match spec.and_then(|s| s.max_iterations.as_ref()) {
             Some(n) if *n.get_ref() < 1 => {
                 return Err(self.text.out_of_range("solver", "max_iterations", n, n.get_ref()));
@@ -141,11 +154,13 @@ impl Builder<'_> {
             Some(n) => *n.get_ref(),
             None => 200,
         };
+        let inversion = spec.map(|s| self.text.choice("solver", "inversion", &s.inversion)).transpose()?.flatten();
         let strategy = Strategy {
             memory: if newton { 0 } else { MEMORY },
             refresh_after: if newton { 1 } else { REFRESH_AFTER },
-            tolerance: tolerance.unwrap_or(1e-7),
+            tolerance,
             max_iterations,
+            without: None,
         };
         let model = Model::new(ModelParts {
             name: name.clone().unwrap_or_else(|| "scene".into()),
@@ -162,6 +177,7 @@ impl Builder<'_> {
             inertia,
             layout,
             start,
+            may_invert: inversion == Some("allow"),
             strategy,
             identity: without_mesh_table(self.text.0),
             warnings,
@@ -172,6 +188,36 @@ impl Builder<'_> {
         };
         let tracks = self.tracks(file, model.ports())?;
         Ok((model, Programme { dt: dt.unwrap_or(0.1), end: end.unwrap_or(1.0), tracks }))
+    }
+}
+
+impl Builder<'_> {
+    fn accuracy(&self, spec: &InertiaSpec, tolerance: f64) -> Result<Option<f64>, SceneError> {
+        let Some(at) = &spec.accuracy else { return Ok(None) };
+        let accuracy = self.text.checked("inertia", "accuracy", at)?;
+        if tolerance > NOISE * accuracy {
+            let message = format!(
+                "`accuracy` is {accuracy:e} m, but positions are solved to {tolerance:e} m only: make it at least ten \
+                 times `tolerance` of [solver], or that smaller"
+            );
+            return Err(self.text.at(at.span().start, message));
+        }
+        Ok(Some(accuracy))
+    }
+
+    fn scheme(&self, spec: &InertiaSpec) -> Result<Scheme, SceneError> {
+        let name = self.text.choice("inertia", "scheme", &spec.scheme)?;
+        let rho = self.text.number("inertia", "rho", &spec.rho)?;
+        if let (Some(rho), true) = (&spec.rho, name != Some("generalised-alpha")) {
+            let message = "`rho` belongs to `scheme = \"generalised-alpha\"`".to_owned();
+            return Err(self.text.at(rho.span().start, message));
+        }
+        Ok(match name {
+            Some("bdf2") => Scheme::Bdf2,
+            Some("generalised-alpha") => Scheme::GeneralisedAlpha { rho: rho.unwrap_or(0.8) },
+            Some("implicit-midpoint") => Scheme::GeneralisedAlpha { rho: 1.0 },
+            _ => Scheme::BackwardEuler,
+        })
     }
 }
 

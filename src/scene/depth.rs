@@ -82,9 +82,9 @@ fn solve(mesh: &TetMesh, n: usize, skin: &[u32], bones: &BTreeSet<u32>) -> Resul
     }
     let X = &mesh.nodes[..n];
     let terms: Vec<Box<dyn Term>> = vec![Elements { X, tets: &mesh.tets, midsides: &[] }.of(Harmonic)];
-    let problem = Problem { terms: &terms, dofs: &dofs, X, pivots: &[], wrenches: &[], at: At::rest() };
+    let problem = Problem { terms: &terms, dofs: &dofs, X, pivots: &[], wrenches: &[], at: At::NOWHERE };
     // The first solve is exact; a correction of a millionth of the whole range ends it.
-    let strategy = Strategy { memory: 1, refresh_after: 2, tolerance: 1e-6, max_iterations: 20 };
+    let strategy = Strategy { memory: 1, refresh_after: 2, tolerance: 1e-6, max_iterations: 20, without: None };
     let mut minimiser = Minimiser::new(&problem, strategy)?;
     minimiser.linearise(&problem, &config)?;
     minimiser.minimise(&problem, &mut config)?;

@@ -271,6 +271,11 @@ pub struct GravitySpec {
 #[serde(deny_unknown_fields)]
 pub struct InertiaSpec {
     pub start: Option<Spanned<String>>,
+    pub scheme: Option<Spanned<String>>,
+    pub rho: Option<Spanned<f64>>,
+    pub damping_mass: Option<Spanned<f64>>,
+    pub damping_stiffness: Option<Spanned<f64>>,
+    pub accuracy: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -285,6 +290,7 @@ pub struct SolverSpec {
     pub method: Option<Spanned<String>>,
     pub tolerance: Option<Spanned<f64>>,
     pub max_iterations: Option<Spanned<u32>>,
+    pub inversion: Option<Spanned<String>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

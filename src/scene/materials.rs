@@ -37,7 +37,7 @@ fn attached(bones: &[BoneSpec], mesh: &TetMesh) -> std::collections::BTreeSet<u3
 }
 
 impl Builder<'_> {
-    /// One term for each material, its overstress if it has one, and the density of each region.
+    /// One term for each material, its overstress and damping if it has them, and the density of each region.
     pub(super) fn tissue(
         &self,
         file: &SceneFile,
@@ -69,6 +69,8 @@ impl Builder<'_> {
         }
         let fields = Fields { mesh, bones: attached(&file.bone, mesh), depth: OnceCell::new() };
         let mut out = Terms::default();
+        let beta = file.inertia.as_ref().and_then(|i| i.damping_stiffness.as_ref());
+        let beta = beta.map_or(Ok(0.0), |b| self.text.checked("inertia", "damping_stiffness", b))?;
         let mut density = vec![0.0; mesh.region_names.len()];
         for (k, spec) in file.tissue.iter().enumerate() {
             let spec = &self.with_preset(spec)?;
@@ -91,7 +93,7 @@ impl Builder<'_> {
                 let tets: Vec<[u32; 4]> = elements.iter().map(|&e| mesh.tets[e]).collect();
                 let midsides: Vec<[u32; 6]> = elements.iter().filter_map(|&e| midsides.get(e).copied()).collect();
                 let elements = Elements { X: &mesh.nodes, tets: &tets, midsides: &midsides };
-                self.add_tissue(spec, law, &constants, elements, &fields, &mut out)?;
+                self.add_tissue(spec, law, &constants, beta, elements, &fields, &mut out)?;
             }
         }
         Ok(Tissue { terms: out.terms, density, n_history: out.n_history })

@@ -10,10 +10,10 @@ use super::build::Builder;
 use super::depth::Depth;
 use super::file::{DamageSpec, FibreSpec, GradeSpec, LimitSpec, TensionSpec, TissueSpec};
 use crate::effect::{
-    Balance, Branches, Damaged, Elements, Fibre, Graded, Law, Limits, NodalPressure, Prestress, Softening,
-    nearest_on_path,
+    Balance, Branches, Damaged, Elements, Fibre, Graded, Law, Limits, Measure, NodalPressure, Prestress, Softening,
+    damping_memory, nearest_on_path, stiffness_damping,
 };
-use crate::energy::{Lame, StrainLimit};
+use crate::energy::{Energy, Lame, Linear, StrainLimit};
 use crate::fem::{Material, Term};
 use crate::math::Vec3;
 use crate::mesh::TetMesh;
@@ -38,12 +38,14 @@ pub(super) struct Terms {
 }
 
 impl Builder<'_> {
-    /// Adds the terms of one tissue on its elements.
+    /// Adds the terms of one tissue on its elements; `beta` is its stiffness damping in s, 0 for none.
+    #[allow(clippy::too_many_arguments)] // a tissue is its keys, its law, its elements and what the scene says of all
     pub(super) fn add_tissue(
         &self,
         spec: &TissueSpec,
         law: &Law,
         constants: &[Vec<f64>],
+        beta: f64,
         elements: Elements,
         fields: &Fields,
         out: &mut Terms,
@@ -79,6 +81,13 @@ impl Builder<'_> {
             out.terms.push(elements.of(graded((law.material)(own))));
         } else {
             out.terms.push((law.term)(own, elements));
+        }
+        if beta > 0.0 {
+            let measure = if law.name == Linear::NAME { Measure::Small } else { Measure::Finite };
+            let Lame { mu, lambda } = (law.moduli)(own);
+            let damping = Lame { mu: beta * mu, lambda: beta * lambda };
+            out.terms.push(elements.of(graded(stiffness_damping(damping, measure, out.n_history))));
+            out.n_history += damping_memory(&elements);
         }
         if let Some(spec) = &spec.viscous {
             let branches = Branches { series: self.series(spec)?, first: out.n_history };

@@ -31,7 +31,7 @@ impl Sim {
         match p.slot {
             Slot::Time => out.fill(self.state.t),
             Slot::SkinPosition => gather(self.model.skin(), &self.state.config.x, offset, out),
-            Slot::SkinVelocity => gather(self.model.skin(), &self.state.v, offset, out),
+            Slot::SkinVelocity => gather(self.model.skin(), &self.state.motion.v, offset, out),
             Slot::SkinRestPosition => gather(self.model.skin(), rest, offset, out),
             Slot::MarkerPosition => rows(|k| self.marker(k), offset, out),
             Slot::BoneReactionForce => rows(|k| o.reaction_force[k], offset, out),

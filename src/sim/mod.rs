@@ -4,13 +4,18 @@
 
 mod access;
 mod model;
+mod motion;
+mod pace;
 mod ports;
 mod recover;
+mod scheme;
+mod start;
 mod state;
 mod step;
 
 pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
 pub use ports::Layout;
+pub use scheme::Scheme;
 pub use state::{State, StateError};
 pub use step::StepReport;
 
@@ -188,7 +193,8 @@ impl Sim {
 
     /// Advances by `dt` seconds; all or nothing.
     ///
-    /// A step spends about five times `solver.max_iterations` linear solves at most, however it is cut.
+    /// A step spends about five times `solver.max_iterations` linear solves at most, however it is cut; with
+    /// `[inertia] accuracy` so does each of its pieces, of which there are 256 at most.
     ///
     /// # Errors
     /// [`SimError`]; the state is then the last accepted one, with the inputs as set.
@@ -233,6 +239,8 @@ impl Sim {
             self.state.config.x[a as usize] = x[a as usize];
         }
         self.state.linearisation = None;
+        self.state.motion.memory.fill([crate::math::Vec3::zeros(); 2]);
+        self.state.motion.dt = 0.0;
         Ok(())
     }
 

@@ -3,11 +3,12 @@
 use sha2::{Digest, Sha256};
 
 use super::ports::{Layout, table};
+use super::scheme::Scheme;
 use crate::fem::{Dofs, Term};
 use crate::math::{Mat3, Vec3, svd};
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::Port;
-use crate::solve::Strategy;
+use crate::solve::{Rung, Strategy};
 
 /// How a bone moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +63,12 @@ pub struct Inertia {
     pub m: Vec<f64>,
     /// Whether time starts at rest rather than in equilibrium.
     pub start_at_rest: bool,
+    /// The time integrator.
+    pub scheme: Scheme,
+    /// Damping in proportion to the mass, 1/s.
+    pub damping_mass: f64,
+    /// Largest estimated error of a piece of a step, m; steps are not cut for it if there is none.
+    pub accuracy: Option<f64>,
 }
 
 /// Makes terms of all elements in a law that is defined everywhere and whose only rest is untangled.
@@ -97,6 +104,8 @@ pub struct ModelParts {
     pub layout: Layout,
     /// Start values of all inputs.
     pub start: Vec<f64>,
+    /// Whether a step may turn elements inside out where their law has an energy for it.
+    pub may_invert: bool,
     /// How the minimum is sought.
     pub strategy: Strategy,
     /// Text that, with the mesh and the ports, identifies the model (the scene).
@@ -170,6 +179,12 @@ impl Model {
         Ok(Model { parts, ports, dofs, skin, triangles, osteotomy, token })
     }
 
+    /// The same without one rung of recovery, to measure what it buys.
+    pub fn without(mut self, rung: Rung) -> Model {
+        self.parts.strategy.without = Some(rung);
+        self
+    }
+
     /// Name of the scene.
     pub fn name(&self) -> &str {
         &self.parts.name
@@ -189,6 +204,10 @@ impl Model {
     /// What is unknown.
     pub fn dofs(&self) -> &Dofs {
         &self.dofs
+    }
+    /// Whether the stiffness is the same everywhere.
+    pub(super) fn is_quadratic(&self) -> bool {
+        self.dofs.bodies.is_empty() && self.parts.terms.iter().all(|t| t.is_quadratic())
     }
     /// Mesh nodes of the skin, in the order of `skin.position`.
     pub fn skin(&self) -> &[u32] {

@@ -15,7 +15,8 @@ use crate::solve::{Minimiser, Outcome, Problem, SolveError, Strategy};
 /// The stand-in only has to untangle, so it is solved coarsely: share of the model's size that the last correction may be.
 const COARSE: f64 = 1e-4;
 /// Pairs that its quasi-Newton method remembers, iterations to a new factor, and at most.
-const STRATEGY: Strategy = Strategy { memory: 8, refresh_after: 10, tolerance: 0.0, max_iterations: 500 };
+const STRATEGY: Strategy =
+    Strategy { memory: 8, refresh_after: 10, tolerance: 0.0, max_iterations: 500, without: None };
 
 /// Moves the free nodes of `config` to the equilibrium of the stand-in. Allocates: this is no common step.
 pub(super) fn untangle(model: &Model, pivots: &[Vec3], config: &mut Configuration) -> Result<Outcome, SolveError> {
@@ -23,8 +24,7 @@ pub(super) fn untangle(model: &Model, pivots: &[Vec3], config: &mut Configuratio
     let X = &parts.mesh.nodes;
     let terms = (parts.stand_in)(&parts.mesh, &parts.midsides);
     let wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
-    let at = At { t: 0.0, dt: 0.0, inputs: &[], history: &[], x_tilde: &[], x_lag: &[] };
-    let problem = Problem { terms: &terms, dofs: model.dofs(), X, pivots, wrenches: &wrenches, at };
+    let problem = Problem { terms: &terms, dofs: model.dofs(), X, pivots, wrenches: &wrenches, at: At::NOWHERE };
     let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
     let strategy = Strategy { tolerance: COARSE * (high - low).norm(), ..STRATEGY };
     let mut minimiser = Minimiser::new(&problem, strategy)?;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 use super::model::Model;
+use super::motion::Motion;
 use crate::bytes::{Reader, Truncated, Writer};
 use crate::fem::Configuration;
 use crate::math::{Mat3, Pose, Vec3};
@@ -15,8 +16,12 @@ pub(super) struct Linearisation {
     pub config: Configuration,
     pub t: f64,
     pub dt: f64,
+    /// Length of the piece of time before, s.
+    pub dt_before: f64,
     pub inputs: Vec<f64>,
     pub history: Vec<f64>,
+    /// Empty in quasi-static scenes.
+    pub x_tilde: Vec<Vec3>,
 }
 
 /// What the last step left for the host to read.
@@ -38,8 +43,8 @@ pub(super) struct Outputs {
 pub struct State {
     pub(super) t: f64,
     pub(super) config: Configuration,
-    /// Nodal velocities, m/s; empty in quasi-static scenes.
-    pub(super) v: Vec<Vec3>,
+    /// What inertia knows of the steps before.
+    pub(super) motion: Motion,
     /// What terms remember of the steps before (viscous overstress); empty in scenes without.
     pub(super) history: Vec<f64>,
     /// Inputs as the host set them last.
@@ -91,7 +96,7 @@ pub enum StateError {
 }
 
 const MAGIC: &[u8; 8] = b"cutis-st";
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 impl State {
     /// At rest, t = 0, inputs at their start values.
@@ -101,7 +106,7 @@ impl State {
         State {
             t: 0.0,
             config: Configuration { x: parts.mesh.nodes.clone(), poses: vec![Pose::REST; n] },
-            v: if parts.inertia.is_some() { vec![Vec3::zeros(); parts.mesh.nodes.len()] } else { Vec::new() },
+            motion: Motion::still(parts.mesh.nodes.len(), parts.inertia.as_ref()),
             history: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
             applied: rest_inputs(model),
@@ -127,7 +132,8 @@ impl State {
             && self.config.poses.len() == parts.bones.len()
             && self.inputs.len() == parts.layout.len()
             && self.history.len() == parts.n_history
-            && self.v.is_empty() == parts.inertia.is_none()
+            && self.motion.v.is_empty() == parts.inertia.is_none()
+            && self.motion.memory.is_empty() != parts.inertia.as_ref().is_some_and(|i| i.scheme.remembers())
     }
 
     /// Versioned, checksummed little-endian bytes; readable in another process with the same model.
@@ -136,7 +142,10 @@ impl State {
         body.text(model.token());
         body.f64(self.t);
         put_config(&mut body, &self.config);
-        put_vectors(&mut body, &self.v);
+        put_vectors(&mut body, &self.motion.v);
+        put_vectors(&mut body, self.motion.memory.as_flattened());
+        body.f64(self.motion.dt);
+        body.f64(self.motion.next_dt);
         body.f64s(self.history.iter().copied());
         body.f64s(self.inputs.iter().copied());
         body.f64s(self.applied.iter().copied());
@@ -151,8 +160,10 @@ impl State {
             put_config(&mut body, &l.config);
             body.f64(l.t);
             body.f64(l.dt);
+            body.f64(l.dt_before);
             body.f64s(l.inputs.iter().copied());
             body.f64s(l.history.iter().copied());
+            put_vectors(&mut body, &l.x_tilde);
         }
         let mut out = Writer::default();
         out.raw(MAGIC);
@@ -191,7 +202,7 @@ impl State {
         let n_inputs = parts.layout.len();
         let t = r.f64()?;
         let config = take_config(&mut r, n, n_bones)?;
-        let v = take_vectors(&mut r, "velocities", if parts.inertia.is_some() { n } else { 0 })?;
+        let motion = take_motion(&mut r, &Motion::still(n, parts.inertia.as_ref()))?;
         let history = take_f64s(&mut r, "remembered values", parts.n_history)?;
         let inputs = take_f64s(&mut r, "inputs", n_inputs)?;
         let applied = take_f64s(&mut r, "inputs", n_inputs)?;
@@ -205,8 +216,10 @@ impl State {
                 config: take_config(&mut r, n, n_bones)?,
                 t: r.f64()?,
                 dt: r.f64()?,
+                dt_before: r.f64()?,
                 inputs: take_f64s(&mut r, "inputs", n_inputs)?,
                 history: take_f64s(&mut r, "remembered values", parts.n_history)?,
+                x_tilde: take_vectors(&mut r, "inertial predictions", motion.v.len())?,
             })),
         };
         let [residual, elastic, kinetic, min_det_f, max_stretch] = scalars[..] else {
@@ -223,7 +236,7 @@ impl State {
             min_det_f,
             max_stretch,
         };
-        Ok(State { t, config, v, history, inputs, applied, linearisation, outputs })
+        Ok(State { t, config, motion, history, inputs, applied, linearisation, outputs })
     }
 }
 
@@ -259,6 +272,13 @@ fn take_vectors(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec
     let n = r.len(24)?;
     expect_len(what, n, wanted)?;
     (0..n).map(|_| Ok(Vec3::new(r.f64()?, r.f64()?, r.f64()?))).collect()
+}
+
+fn take_motion(r: &mut Reader, like: &Motion) -> Result<Motion, StateError> {
+    let v = take_vectors(r, "velocities", like.v.len())?;
+    let memory = take_vectors(r, "remembered motions", 2 * like.memory.len())?;
+    let memory = memory.chunks_exact(2).map(|m| [m[0], m[1]]).collect();
+    Ok(Motion { v, memory, dt: r.f64()?, next_dt: r.f64()? })
 }
 
 fn take_f64s(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec<f64>, StateError> {

@@ -1,23 +1,29 @@
 //! One host step: targets, prediction, minimisation, acceptance. All or nothing.
 //!
-//! Quasi-static equilibrium and backward Euler are one minimisation (see `effect::inertia`); a step that fails is cut
-//! into smaller pieces of load and time.
+//! Quasi-static equilibrium and the steps of every time integrator are one minimisation (see `effect::inertia` and
+//! `scheme`); a step that fails is cut into smaller pieces of load and time.
 
 use std::sync::Arc;
 
 use super::model::{Drive, Model};
+use super::motion::Motion;
+use super::pace::{Pace, even_part};
 use super::recover::untangle;
+use super::scheme::Scheme;
+use super::start::accelerations;
 use super::state::{Linearisation, State};
 use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
 use crate::math::{Mat3, Pose, Vec3, best_fit};
 use crate::port::Slot;
-use crate::solve::{Minimiser, Outcome, Problem};
+use crate::solve::{Minimiser, Outcome, Problem, Rung};
 
 /// A step is cut into pieces no smaller than this part of it.
 const SMALLEST_PIECE: f64 = 1.0 / 64.0;
-/// A piece that turns elements inside out is cut, down to this part of the step; then it is taken and told.
+/// A piece that turns elements inside out is cut; where the scene allows them, down to this part of the step only.
 const SMALLEST_TO_AVOID_INVERSION: f64 = 1.0 / 8.0;
+/// What is left of a step that is no further piece.
+const ROUND_OFF: f64 = 1e-9;
 /// Most linear solves of a whole step, in units of `solver.max_iterations`.
 const BUDGET: u32 = 4;
 /// After a piece that succeeded the next one may be this much larger.
@@ -40,6 +46,8 @@ pub struct StepReport {
     pub factorisations: u32,
     /// Pieces the step was cut into; 1 if it went in one.
     pub substeps: u32,
+    /// Largest estimated error in time of a piece, m; 0 without `[inertia] accuracy`.
+    pub time_error: f64,
     /// Norm of the force residual, N.
     pub residual: f64,
     /// Largest nodal motion of the last correction, m.
@@ -64,7 +72,9 @@ pub(super) struct Workspace {
     config: Configuration,
     /// Where the piece at hand started from.
     before: Configuration,
-    v: Vec<Vec3>,
+    motion: Motion,
+    /// Estimated error in time of the last piece, m.
+    time_error: f64,
     /// What terms remember, and where the next memory is written.
     history: Vec<f64>,
     remembered: Vec<f64>,
@@ -87,14 +97,15 @@ impl Workspace {
             X,
             pivots: &pivots,
             wrenches: &wrenches,
-            at: At { t: 0.0, dt: 0.0, inputs: &parts.start, history: &[], x_tilde: X, x_lag: X },
+            at: At { inputs: &parts.start, x_tilde: X, x_lag: X, ..At::NOWHERE },
         };
         Ok(Workspace {
             minimiser: Minimiser::new(&problem, parts.strategy)?,
             factored: None,
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             before: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
-            v: vec![Vec3::zeros(); if parts.inertia.is_some() { X.len() } else { 0 }],
+            motion: Motion::still(X.len(), parts.inertia.as_ref()),
+            time_error: 0.0,
             history: vec![0.0; parts.n_history],
             remembered: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
@@ -122,12 +133,28 @@ pub(super) fn initialise(model: &Model, state: &mut State, work: &mut Workspace)
         }
         state.applied.copy_from_slice(&state.inputs);
         state.outputs.converged = true;
+        set_off(model, state, work);
         return Ok(StepReport::new(0));
     }
     let report = advance(model, state, work, 0.0)?;
     // Nothing has moved yet: the way to the start equilibrium is no velocity.
-    state.v.fill(Vec3::zeros());
+    state.motion.halt();
     Ok(report)
+}
+
+/// Gives the tissue the acceleration that its forces make at rest, where the scheme remembers one.
+fn set_off(model: &Model, state: &mut State, work: &mut Workspace) {
+    let parts = model.parts();
+    let Some(inertia) = parts.inertia.as_ref().filter(|i| matches!(i.scheme, Scheme::GeneralisedAlpha { .. })) else {
+        return;
+    };
+    read_wrenches(model, &state.inputs, &mut work.wrenches);
+    let Workspace { pivots, wrenches, inputs, history, .. } = work;
+    history.copy_from_slice(&state.history);
+    let at = At { t: state.t, inputs, history, x_tilde: &parts.mesh.nodes, ..At::NOWHERE };
+    let problem = Problem { terms: &parts.terms, dofs: model.dofs(), X: &parts.mesh.nodes, pivots, wrenches, at };
+    let a = accelerations(&problem, &state.config, &inertia.m);
+    state.motion.memory.iter_mut().zip(a).for_each(|(memory, a)| memory[0] = a);
 }
 
 /// Moves `state` on by `dt` seconds, or leaves it as it is.
@@ -135,13 +162,19 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     check_inputs(model, &state.inputs)?;
     read_pivots(model, &state.inputs, &mut work.pivots);
     work.config.copy_from(&state.config);
-    work.v.copy_from_slice(&state.v);
+    work.motion.copy_from(&state.motion);
     work.history.copy_from_slice(&state.history);
     let mut report = StepReport::new(0);
     let mut linearisation = state.linearisation.clone();
+    let pace = Pace::of(model.parts().inertia.as_ref()).filter(|_| dt > 0.0);
+    let smallest = if pace.is_some() { Pace::SMALLEST } else { SMALLEST_PIECE };
     let (mut done, mut piece) = (0.0, 1.0);
+    if pace.is_some() && state.motion.next_dt > 0.0 {
+        piece = even_part(1.0, (state.motion.next_dt / dt).max(smallest));
+    }
+    let mut spent_before = 0;
     while done < 1.0 {
-        let to: f64 = if done + piece >= 1.0 { 1.0 } else { done + piece };
+        let to: f64 = if done + piece >= 1.0 - ROUND_OFF { 1.0 } else { done + piece };
         for ((now, from), last) in work.inputs.iter_mut().zip(&state.applied).zip(&state.inputs) {
             *now = if to == 1.0 { *last } else { from + to * (last - from) };
         }
@@ -150,33 +183,54 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
         work.before.copy_from(&work.config);
         let linearised_before = linearisation.clone();
         let t = state.t + to * dt;
-        match step_piece(model, work, &mut linearisation, t, dt * (to - done), to - done, &mut report) {
+        let bound = pace.filter(|_| to - done > smallest);
+        match step_piece(model, work, &mut linearisation, t, dt * (to - done), to - done, bound, &mut report) {
             Ok(()) => {
                 report.substeps += 1;
                 piece = GROWTH * (to - done);
+                if let Some(pace) = &pace {
+                    let error = work.time_error;
+                    report.time_error = report.time_error.max(error);
+                    piece = ((to - done) * pace.next(error)).max(smallest);
+                    work.motion.next_dt = dt * piece;
+                    piece = even_part(1.0 - to, piece);
+                    spent_before = report.iterations;
+                }
                 done = to;
             }
-            Err(source) => {
+            Err(Setback::Coarse(factor)) => {
+                work.config.copy_from(&work.before);
+                linearisation = linearised_before;
+                piece = even_part(1.0 - done, (factor * (to - done)).max(smallest));
+            }
+            Err(Setback::Failed(source)) => {
                 work.config.copy_from(&work.before);
                 linearisation = linearised_before;
                 piece = 0.5 * (to - done);
                 report.iterations += source.iterations();
-                if piece < SMALLEST_PIECE || report.iterations > BUDGET * model.parts().strategy.max_iterations {
+                let spent = report.iterations - spent_before;
+                if piece < smallest
+                    || !model.parts().strategy.has(Rung::Pieces)
+                    || spent > BUDGET * model.parts().strategy.max_iterations
+                {
                     let cuts = (1.0 / (to - done)).round() as u32;
                     return Err(SimError::Solve { t: state.t, dt, cuts, spent: report.iterations, source });
                 }
             }
         }
     }
-    let at = At { t: state.t + dt, dt, inputs: &work.inputs, history: &work.history, x_tilde: &[], x_lag: &[] };
+    let at = At { t: state.t + dt, dt, inputs: &work.inputs, history: &work.history, ..At::NOWHERE };
     let strain = strain_of(model, &at, &work.config.x);
     if strain.min_det_f <= 0.0 && state.outputs.min_det_f > 0.0 {
         report.warnings.push(format!("elements are turned inside out (smallest det F {:.3})", strain.min_det_f));
     }
+    if let Some(pace) = pace.filter(|pace| !pace.holds(report.time_error)) {
+        report.warnings.push(pace.broken(report.time_error));
+    }
     warn_of_jumps(model, &state.config, &work.config, &mut report);
     state.t += dt;
     state.config.copy_from(&work.config);
-    state.v.copy_from_slice(&work.v);
+    state.motion.copy_from(&work.motion);
     state.history.copy_from_slice(&work.history);
     state.applied.copy_from_slice(&work.inputs);
     state.linearisation = linearisation;
@@ -194,6 +248,7 @@ impl StepReport {
             iterations: 0,
             factorisations: 0,
             substeps,
+            time_error: 0.0,
             residual: 0.0,
             correction: 0.0,
             converged: true,
@@ -212,7 +267,22 @@ impl StepReport {
     }
 }
 
-/// One piece of a step, from and into `work`.
+/// Why a piece of a step is not taken.
+enum Setback {
+    /// It has no answer.
+    Failed(SolveError),
+    /// It should be cut to this part of it for the sake of accuracy.
+    Coarse(f64),
+}
+
+impl From<SolveError> for Setback {
+    fn from(source: SolveError) -> Setback {
+        Setback::Failed(source)
+    }
+}
+
+/// One piece of a step, from and into `work`; `bound` by an accuracy if it may still be cut.
+#[allow(clippy::too_many_arguments)] // the time, its length and its part of the step are three facts
 fn step_piece(
     model: &Model,
     work: &mut Workspace,
@@ -220,20 +290,32 @@ fn step_piece(
     t: f64,
     dt: f64,
     piece: f64,
+    bound: Option<Pace>,
     report: &mut StepReport,
-) -> Result<(), SolveError> {
+) -> Result<(), Setback> {
     let parts = model.parts();
+    let strategy = &parts.strategy;
     let dofs = model.dofs();
-    let Workspace { minimiser, factored, config, before, v, history, remembered, inputs, x_tilde, pivots, u, wrenches } =
-        work;
-    for ((y, x), v) in x_tilde.iter_mut().zip(&config.x).zip(&*v) {
-        *y = x + dt * v;
-    }
-    let at = At { t, dt, inputs, history, x_tilde, x_lag: &[] };
-    let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
+    let Workspace {
+        minimiser,
+        factored,
+        config,
+        before,
+        motion,
+        time_error,
+        history,
+        remembered,
+        inputs,
+        x_tilde,
+        pivots,
+        u,
+        wrenches,
+    } = work;
+    let at = At { t, dt, inputs, history, ..At::NOWHERE };
     let is_inverted = |x: &[Vec3]| strain_of(model, &at, x).min_det_f <= 0.0;
     // A start that no step has led to may be tangled.
-    let untangled = linearisation.is_none() && !problem.is_quadratic() && is_inverted(&config.x);
+    let untangled =
+        linearisation.is_none() && !model.is_quadratic() && strategy.has(Rung::StandIn) && is_inverted(&config.x);
     let mut still_tangled = false;
     if untangled {
         let outcome = untangle(model, pivots, config)?;
@@ -242,11 +324,18 @@ fn step_piece(
         still_tangled = is_inverted(&config.x);
     }
 
-    restore_factor(model, &problem, minimiser, factored, linearisation, config, report)?;
     place_bones(model, inputs, config);
     target_increments(model, inputs, pivots, config, u);
+    let formula =
+        parts.inertia.as_ref().filter(|_| dt > 0.0).map(|i| (i.damping_mass, i.scheme.formula(dt, motion.dt)));
+    if let Some((damping, formula)) = &formula {
+        motion.predict(formula, *damping, dofs, &before.x, u, x_tilde);
+    }
+    let at = At { x_tilde, ..in_time(model, at, motion.dt) };
+    let problem = Problem { terms: &parts.terms, dofs, X: &parts.mesh.nodes, pivots, wrenches, at };
+    restore_factor(model, &problem, motion.dt, minimiser, factored, linearisation, config, report)?;
     if !problem.is_quadratic() {
-        if dt == 0.0 || parts.inertia.is_none() {
+        if (dt == 0.0 || parts.inertia.is_none()) && strategy.has(Rung::RigidMotion) {
             move_along(dofs.prescribed.as_slice(), config, u);
         }
         minimiser.set_frame(frame(factored.as_deref(), config));
@@ -267,18 +356,30 @@ fn step_piece(
     let outcome = outcome.inspect_err(|_| *factored = None)?;
     report.count(&outcome);
     let inverted_before = || if untangled { still_tangled } else { is_inverted(&before.x) };
-    let avoid_inversion = piece > SMALLEST_TO_AVOID_INVERSION && !problem.is_quadratic();
+    let avoid_inversion = !problem.is_quadratic()
+        && strategy.has(Rung::Inversion)
+        && (!parts.may_invert || piece > SMALLEST_TO_AVOID_INVERSION);
     if avoid_inversion && is_inverted(&config.x) && !inverted_before() {
         *factored = None;
-        return Err(SolveError::Inverts);
+        return Err(SolveError::Inverts.into());
+    }
+    if parts.inertia.as_ref().is_some_and(|i| i.accuracy.is_some()) {
+        let error = formula.as_ref().map_or(0.0, |(_, formula)| motion.error(formula, dofs, before, config));
+        if let Some(pace) = bound.filter(|pace| !pace.holds(error)) {
+            *factored = None;
+            return Err(Setback::Coarse(pace.next(error)));
+        }
+        *time_error = error;
     }
     if outcome.factorisations > 0 {
         let made = Linearisation {
             config: minimiser.factored_at().clone(),
             t,
             dt,
+            dt_before: motion.dt,
             inputs: inputs.clone(),
             history: history.clone(),
+            x_tilde: x_tilde.clone(),
         };
         let made = Arc::new(made);
         *factored = Some(made.clone());
@@ -289,18 +390,30 @@ fn step_piece(
         parts.terms.iter().filter(|t| t.remembers()).for_each(|t| t.commit(&at, &config.x, remembered));
         std::mem::swap(history, remembered);
     }
-    if parts.inertia.is_some() && dt > 0.0 {
-        for ((v, x), x0) in v.iter_mut().zip(&config.x).zip(&before.x) {
-            *v = (x - x0) / dt;
-        }
+    if let Some((_, formula)) = &formula {
+        motion.arrive(formula, dt, dofs, before, config);
     }
     Ok(())
 }
 
+/// `at` with the coefficients of the scene's scheme, after a piece of `dt_before`.
+fn in_time<'a>(model: &Model, at: At<'a>, dt_before: f64) -> At<'a> {
+    match &model.parts().inertia {
+        Some(i) if at.dt > 0.0 => At {
+            inertia: i.scheme.formula(at.dt, dt_before).coefficient(i.damping_mass),
+            difference: i.scheme.difference(at.dt, dt_before),
+            ..at
+        },
+        _ => at,
+    }
+}
+
 /// Makes the minimiser's factor the one the state remembers, or a new one at `config` if there is none that serves.
+#[allow(clippy::too_many_arguments)] // the halves of a workspace
 fn restore_factor(
     model: &Model,
     problem: &Problem,
+    dt_before: f64,
     minimiser: &mut Minimiser,
     factored: &mut Option<Arc<Linearisation>>,
     linearisation: &mut Option<Arc<Linearisation>>,
@@ -308,14 +421,22 @@ fn restore_factor(
     report: &mut StepReport,
 ) -> Result<(), SolveError> {
     let dt = problem.at.dt;
+    let as_made = |l: &Linearisation| in_time(model, At { dt: l.dt, ..At::NOWHERE }, l.dt_before);
+    let near = |a: f64, b: f64| a == b || a != 0.0 && b != 0.0 && (a / b).ln().abs() <= DT_DRIFT;
     let serves = |l: &Linearisation| {
         model.parts().inertia.is_none() && model.parts().n_history == 0
-            || (l.dt == 0.0) == (dt == 0.0) && (dt == 0.0 || (l.dt / dt).ln().abs() <= DT_DRIFT)
+            || near(l.dt, dt) && near(as_made(l).inertia.sqrt(), problem.at.inertia.sqrt())
     };
     if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
         let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
         if !(same && minimiser.is_factored()) {
-            let at = At { t: wanted.t, dt: wanted.dt, inputs: &wanted.inputs, history: &wanted.history, ..problem.at };
+            let at = At {
+                t: wanted.t,
+                inputs: &wanted.inputs,
+                history: &wanted.history,
+                x_tilde: &wanted.x_tilde,
+                ..as_made(wanted)
+            };
             *factored = None;
             minimiser.linearise(&Problem { at, ..*problem }, &wanted.config)?;
             *factored = Some(wanted.clone());
@@ -329,8 +450,10 @@ fn restore_factor(
         config: config.clone(),
         t: problem.at.t,
         dt,
+        dt_before,
         inputs: problem.at.inputs.to_vec(),
         history: problem.at.history.to_vec(),
+        x_tilde: problem.at.x_tilde.to_vec(),
     });
     *factored = Some(made.clone());
     *linearisation = Some(made);
@@ -487,8 +610,7 @@ fn read_outputs(model: &Model, state: &mut State, work: &Workspace, report: &Ste
     o.elastic = report.elastic;
     o.min_det_f = report.min_det_f;
     o.max_stretch = report.max_stretch;
-    o.kinetic = parts
-        .inertia
-        .as_ref()
-        .map_or(0.0, |inertia| 0.5 * inertia.m.iter().zip(&state.v).map(|(m, v)| m * v.norm_squared()).sum::<f64>());
+    o.kinetic = parts.inertia.as_ref().map_or(0.0, |inertia| {
+        0.5 * inertia.m.iter().zip(&state.motion.v).map(|(m, v)| m * v.norm_squared()).sum::<f64>()
+    });
 }

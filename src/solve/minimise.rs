@@ -8,7 +8,7 @@
 //! the approximate condition of Hager & Zhang, SIAM J. Optim. 16(1), 2005, where energy differences drown in round-off.
 
 use super::lbfgs::{Lbfgs, dot};
-use super::{Cholesky, LinearSolver, Problem, SolveError};
+use super::{Cholesky, LinearSolver, Problem, Rung, SolveError};
 use crate::fem::{Assembly, Configuration, Curvature};
 use crate::math::{Mat3, Vec3};
 
@@ -23,6 +23,15 @@ pub struct Strategy {
     pub tolerance: f64,
     /// Most linear solves in one minimisation.
     pub max_iterations: u32,
+    /// A rung that is left out, to be measured.
+    pub without: Option<Rung>,
+}
+
+impl Strategy {
+    /// Whether this rung is there.
+    pub fn has(&self, rung: Rung) -> bool {
+        self.without != Some(rung)
+    }
 }
 
 /// How a minimisation ended.
@@ -141,6 +150,9 @@ impl Minimiser {
                     self.factored = true;
                     return Ok(());
                 }
+                Err(block) if !self.strategy.has(Rung::Projection) => {
+                    return Err(SolveError::Singular { block, n_blocks: problem.dofs.n_blocks() });
+                }
                 Err(_) if curvature == Curvature::Projected && problem.is_beyond_numbers(config) => {
                     return Err(SolveError::NotFinite);
                 }
@@ -156,7 +168,7 @@ impl Minimiser {
     /// Moves `config` to where the factor at hand expects the equilibrium once the prescribed nodes have gone by `u`:
     /// `K d = -(g + K_p u)`. The prescribed nodes of `config` are moved, too.
     pub fn predict(&mut self, problem: &Problem, config: &mut Configuration, u: &[Vec3]) {
-        let Minimiser { assembly, cholesky, frame, lag, nodal, g, d, trial, .. } = self;
+        let Minimiser { assembly, cholesky, strategy, frame, lag, nodal, g, d, trial, .. } = self;
         lag.copy_from(config);
         problem.gradient(config, lag, nodal, g);
         d.fill(Vec3::zeros());
@@ -166,6 +178,9 @@ impl Minimiser {
         }
         cholesky.solve(d);
         turn(frame, d);
+        if !strategy.has(Rung::Predictor) {
+            d.fill(Vec3::zeros());
+        }
         trial.copy_from(config);
         for (&a, u) in problem.dofs.prescribed.iter().zip(u) {
             trial.x[a as usize] += u;
@@ -209,7 +224,9 @@ impl Minimiser {
             let last = outcome.correction <= self.strategy.tolerance;
             match self.search(problem, config, energy, slope) {
                 Some((alpha, new_energy)) => {
-                    self.memory.remember(alpha, &self.d, &self.g, &self.g_trial);
+                    if self.strategy.has(Rung::Memory) {
+                        self.memory.remember(alpha, &self.d, &self.g, &self.g_trial);
+                    }
                     std::mem::swap(&mut self.g, &mut self.g_trial);
                     config.copy_from(&self.trial);
                     energy = new_energy;
@@ -283,7 +300,7 @@ impl Minimiser {
             problem.dofs.retract(problem.X, problem.pivots, config, alpha, &self.d, &mut self.trial);
             let tried = problem.gradient(&self.trial, &self.lag, &mut self.nodal, &mut self.g_trial);
             let noise = ENERGY_NOISE * (energy.abs() + tried.abs());
-            if tried <= energy + ARMIJO * alpha * slope {
+            if tried <= energy + ARMIJO * alpha * slope || tried.is_finite() && !self.strategy.has(Rung::LineSearch) {
                 return Some((alpha, tried));
             }
             let new_slope = dot(&self.g_trial, &self.d);

@@ -7,11 +7,13 @@ mod lbfgs;
 mod minimise;
 mod ordering;
 mod problem;
+mod rung;
 
 pub use cholesky::Cholesky;
 pub use minimise::{Minimiser, Outcome, Strategy};
 pub use ordering::nested_dissection;
 pub use problem::Problem;
+pub use rung::Rung;
 
 /// Why a step was refused. The state is still the last accepted one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -60,7 +62,10 @@ pub enum SolveError {
         limit: usize,
     },
     /// The step would turn elements inside out; a smaller one may not.
-    #[error("the step would turn elements inside out")]
+    #[error(
+        "elements would be turned inside out: on this path the tissue has no equilibrium without; move or load it less, \
+         choose a law that resists collapse (neo-hookean), or take it as it is with [solver] inversion = \"allow\""
+    )]
     Inverts,
 }
 

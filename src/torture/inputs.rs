@@ -3,7 +3,7 @@
 use super::materials::mesh_of;
 use super::scene::{Block, tissue};
 use super::trial::{End, Tally, Trial, fail, near};
-use super::{Case, LAWS, NONE, ONE_LAW};
+use super::{Case, LAWS, LINEAR, NONE, ONE_LAW};
 use crate::error::Error;
 use crate::load;
 use crate::math::Vec3;
@@ -21,6 +21,7 @@ pub const CASES: &[Case] = &[
         what: "Sets NaN and the infinities into every input; each step is refused and names the input.",
         laws: ONE_LAW,
         may_invert: NONE,
+        may_refuse: ONE_LAW,
         body: not_a_number,
     },
     Case {
@@ -28,13 +29,15 @@ pub const CASES: &[Case] = &[
         what: "Sets the smallest numbers into every input; the tissue stays at rest.",
         laws: LAWS,
         may_invert: NONE,
+        may_refuse: NONE,
         body: denormal,
     },
     Case {
         name: "huge",
         what: "Sets 1e150 and 1e300 into every input, answered or refused, and zero again; ends at rest.",
         laws: LAWS,
-        may_invert: &["linear", "corotational", "stable-neo-hookean"],
+        may_invert: LINEAR,
+        may_refuse: LAWS,
         body: huge,
     },
     Case {
@@ -42,6 +45,7 @@ pub const CASES: &[Case] = &[
         what: "Shuffles nodes and elements; the answer is the same to 1e-9 of the length.",
         laws: LAWS,
         may_invert: NONE,
+        may_refuse: NONE,
         body: renumbered,
     },
     Case {
@@ -49,6 +53,7 @@ pub const CASES: &[Case] = &[
         what: "Multiplies all lengths by 1e3; the shape is the same to 1e-9 of the length.",
         laws: LAWS,
         may_invert: NONE,
+        may_refuse: NONE,
         body: scaled,
     },
     Case {
@@ -56,6 +61,7 @@ pub const CASES: &[Case] = &[
         what: "Lets two bones claim the nodes of an edge; the error names both bones.",
         laws: ONE_LAW,
         may_invert: NONE,
+        may_refuse: ONE_LAW,
         body: two_bones,
     },
     Case {
@@ -63,6 +69,7 @@ pub const CASES: &[Case] = &[
         what: "Leaves the block, then a second block beside it, without a bone; the error says where.",
         laws: ONE_LAW,
         may_invert: NONE,
+        may_refuse: ONE_LAW,
         body: unheld,
     },
     Case {
@@ -70,6 +77,7 @@ pub const CASES: &[Case] = &[
         what: "Starts from too few positions and from NaN; each is refused and changes nothing.",
         laws: ONE_LAW,
         may_invert: NONE,
+        may_refuse: ONE_LAW,
         body: bad_starts,
     },
 ];

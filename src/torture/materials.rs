@@ -17,7 +17,7 @@ const SLIVER: f64 = 1e-5;
 const SLIVERS: usize = 6;
 
 const fn case(name: &'static str, what: &'static str, body: fn(&str, &mut Tally) -> Result<(), End>) -> Case {
-    Case { name, what, laws: LAWS, may_invert: NONE, body }
+    Case { name, what, laws: LAWS, may_invert: NONE, may_refuse: NONE, body }
 }
 
 pub const CASES: &[Case] = &[

@@ -1,8 +1,9 @@
 //! Bones and forces that move far, fast, or back and forth.
 
 use super::scene::Block;
-use super::trial::{End, Tally, Trial};
-use super::{Case, LAWS, LINEAR, NONE};
+use super::trial::{End, Tally, Trial, fail};
+use super::{Case, FOLDING, LAWS, LINEAR, NONE};
+use crate::math::{Vec3, exp_rotation};
 
 /// Distance that counts as the same place, m: ten times the tolerance of the solver.
 const SAME: f64 = 1e-6;
@@ -12,18 +13,33 @@ const BACK: f64 = 1e-7;
 const DT: f64 = 0.1;
 
 const fn case(name: &'static str, what: &'static str, body: fn(&str, &mut Tally) -> Result<(), End>) -> Case {
-    Case { name, what, laws: LAWS, may_invert: LINEAR, body }
+    Case { name, what, laws: LAWS, may_invert: LINEAR, may_refuse: NONE, body }
 }
 
 pub const CASES: &[Case] = &[
     case("twist-360", "Twists the jaw by a full turn and back, 10 degrees a step; ends at rest.", twist),
-    case("compress-30", "Presses the block to 30 % of its length, 5 % a step.", compress),
+    Case {
+        may_refuse: FOLDING,
+        ..case(
+            "compress-30",
+            "Presses the block to 30 % of its length, 5 % a step, and lets go; half its length is answered, the rest may be refused; ends at rest.",
+            compress,
+        )
+    },
+    case(
+        "carried",
+        "Turns both bones by 120 degrees in one step, then back; tissue that knows rotations goes with them.",
+        carried,
+    ),
     case(
         "jump",
         "Pulls the jaw by 5 cm and turns it by 90 degrees in one step; ends where twenty small steps end.",
         jump,
     ),
-    case("force-1e4", "Pushes with 1e4 times the force, then lets go; ends at rest.", force),
+    Case {
+        may_refuse: FOLDING,
+        ..case("force-1e4", "Pushes with 1e4 times the force, answered or refused, then lets go; ends at rest.", force)
+    },
     Case {
         may_invert: NONE,
         ..case("alternate", "Turns the load around at every step; each answer is as the first.", alternate)
@@ -46,11 +62,38 @@ fn twist(law: &str, tally: &mut Tally) -> Result<(), End> {
 fn compress(law: &str, tally: &mut Tally) -> Result<(), End> {
     let scene = Block::of(law);
     let mut trial = Trial::new(&scene.text(), tally)?;
+    let mut refused = None;
     for k in 1..=14 {
         trial.jaw([-0.05 * f64::from(k) * scene.size()[0], 0.0, 0.0], [0.0; 3])?;
-        trial.step(DT)?;
+        match trial.try_step(DT)? {
+            Some(message) if k <= 10 => return fail(format!("refused at {} %: {message}", 100 - 5 * k)),
+            Some(message) => {
+                refused = Some(message);
+                break;
+            }
+            None => {}
+        }
     }
-    Ok(())
+    trial.jaw([0.0; 3], [0.0; 3])?;
+    trial.step(DT)?;
+    trial.near(trial.rest(), SAME, "rest")?;
+    refused.map_or(Ok(()), |message| Err(End::Refused(message)))
+}
+
+fn carried(law: &str, tally: &mut Tally) -> Result<(), End> {
+    let mut trial = Trial::new(&Block::of(law).text(), tally)?;
+    // The pivots are the middles of two ends, so that turns about x carry the block as one.
+    let pivot = 0.5 * Vec3::from(Block::of(law).size());
+    for angle in [120.0_f64, 0.0] {
+        let w = Vec3::new(angle.to_radians(), 0.0, 0.0);
+        trial.set("bone.rotation", 0, &[w.x, w.y, w.z, w.x, w.y, w.z])?;
+        trial.step(DT)?;
+        if law != "linear" {
+            let carried: Vec<Vec3> = trial.rest().iter().map(|X| pivot + exp_rotation(&w) * (X - pivot)).collect();
+            trial.near(&carried, SAME, "where the bones carry it")?;
+        }
+    }
+    trial.near(trial.rest(), SAME, "rest")
 }
 
 fn jump(law: &str, tally: &mut Tally) -> Result<(), End> {

@@ -11,7 +11,7 @@ const AT_REST: f64 = 1e-6;
 const SEEDS: u64 = 8;
 
 const fn start(name: &'static str, what: &'static str, body: fn(&str, &mut Tally) -> Result<(), End>) -> Case {
-    Case { name, what, laws: LAWS, may_invert: NONE, body }
+    Case { name, what, laws: LAWS, may_invert: NONE, may_refuse: NONE, body }
 }
 
 pub const CASES: &[Case] = &[

@@ -18,6 +18,7 @@ pub const CASES: &[Case] = &[
         what: "Moves the jaw within a second, with inertia and steps from 1e-6 to 1e3 s and back; ends in equilibrium.",
         laws: LAWS,
         may_invert: NONE,
+        may_refuse: NONE,
         body: dt,
     },
     Case {
@@ -25,6 +26,7 @@ pub const CASES: &[Case] = &[
         what: "Opens and closes the jaw 500 times, 20 steps a cycle; each cycle is as the first to 1e-7 m.",
         laws: LAWS,
         may_invert: NONE,
+        may_refuse: NONE,
         body: cycles,
     },
     Case {
@@ -32,6 +34,7 @@ pub const CASES: &[Case] = &[
         what: "Steps of 0, -1, NaN and infinitely many seconds; each is refused.",
         laws: ONE_LAW,
         may_invert: NONE,
+        may_refuse: ONE_LAW,
         body: zero,
     },
     Case {
@@ -39,6 +42,7 @@ pub const CASES: &[Case] = &[
         what: "Steps of 1e-200 and 1e200 s with inertia, answered or refused, then a common one.",
         laws: LAWS,
         may_invert: NONE,
+        may_refuse: LAWS,
         body: vanishing,
     },
 ];

@@ -8,13 +8,16 @@ use crate::mesh::TetMesh;
 use crate::port::{Port, Type};
 use crate::scene::{SceneFile, build};
 use crate::sim::{Sim, SimError};
+use crate::solve::Rung;
 
 /// Most linear solves of one step; five times the scene's default of 200, and some.
 const MOST_SOLVES: u32 = 1200;
 
-/// What a case took.
+/// What a case may use and what it took.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tally {
+    /// A rung of recovery that it has to do without.
+    pub without: Option<Rung>,
     /// Linear solves, those spent in vain included.
     pub iterations: u32,
     /// Smallest det F of all accepted steps; +inf before the first.
@@ -25,7 +28,7 @@ pub struct Tally {
 
 impl Default for Tally {
     fn default() -> Self {
-        Tally { iterations: 0, min_det_f: f64::INFINITY, energy: 0.0 }
+        Tally { without: None, iterations: 0, min_det_f: f64::INFINITY, energy: 0.0 }
     }
 }
 
@@ -64,6 +67,10 @@ impl<'a> Trial<'a> {
     }
 
     fn of(model: crate::sim::Model, tally: &'a mut Tally) -> Result<Trial<'a>, End> {
+        let model = match tally.without {
+            Some(rung) => model.without(rung),
+            None => model,
+        };
         let sim = Sim::new(Arc::new(model)).map_err(|e| End::Fail(format!("no simulation: {e}")))?;
         Ok(Trial { sim, disturbed: false, tally })
     }

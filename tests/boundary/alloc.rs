@@ -72,6 +72,25 @@ fn a_step_after_the_first_allocates_nothing() {
 }
 
 #[test]
+fn a_dynamic_step_allocates_nothing_without_a_new_factor() {
+    let scene = "[mesh.block]\nsize = [0.04, 0.02, 0.02]\ncells = [4, 2, 2]\n[[tissue]]\nE = 1e4\nnu = 0.4\n[[bone]]\n\
+                 name = \"skull\"\nnodes = \"x_min\"\n[inertia]\nscheme = \"generalised-alpha\"\ndamping_mass = 1.0\n\
+                 damping_stiffness = 1e-3\naccuracy = 1e-3\n";
+    let mut sim = Sim::new(Arc::new(cutis::load::from_text(scene, None).unwrap().model)).unwrap();
+    let translation = sim.model().ports().iter().position(|p| p.name == "bone.translation").unwrap();
+    sim.initialise().unwrap();
+    let mut clean = 0;
+    for k in 1..=20 {
+        sim.set_f64(translation, 0, &[1e-4 * f64::from(k), 0.0, 0.0]).unwrap();
+        let mut factorisations = 0;
+        let counted = allocations(|| factorisations = sim.step(0.01).unwrap().factorisations);
+        assert!(factorisations > 0 || counted == 0, "step {k}: {counted} allocations");
+        clean += u32::from(factorisations == 0);
+    }
+    assert!(clean >= 10, "{clean} steps of 20 without a factor");
+}
+
+#[test]
 fn the_c_library_and_fmi_copy_without_allocation() {
     // SAFETY: handles and buffers of this test, used by one thread, lengths as asked.
     unsafe {

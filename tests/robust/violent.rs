@@ -59,3 +59,30 @@ fn unloading_leads_back_to_rest() {
         assert!(error < 1e-7, "{energy}: {error:.1e} m from rest");
     }
 }
+
+#[test]
+fn elements_inside_out_are_refused_unless_the_scene_allows_them() {
+    let mut strict = sim(&block("stable-neo-hookean"));
+    let mut lax = sim(&format!("{}[solver]\ninversion = \"allow\"\n", block("stable-neo-hookean")));
+    let bytes = |sim: &cutis::sim::Sim| sim.save().to_bytes(sim.model());
+    let (mut refused, mut told) = (None, false);
+    for k in 1..=15 {
+        let u = -0.003 * f64::from(k);
+        set(&mut lax, "bone.translation", 3, &[u, 0.0, 0.0]);
+        let report = lax.step(0.1).expect("an answer, if need be inside out");
+        told |= report.warnings.iter().any(|w| w.contains("inside out"));
+        if refused.is_none() {
+            set(&mut strict, "bone.translation", 3, &[u, 0.0, 0.0]);
+            let before = bytes(&strict);
+            match strict.step(0.1) {
+                Ok(report) => assert!(report.min_det_f > 0.0, "{report:?}"),
+                Err(e) => {
+                    assert_eq!(bytes(&strict), before);
+                    refused = Some(e.to_string());
+                }
+            }
+        }
+    }
+    assert!(told, "the block was to be pressed until it folds");
+    assert!(refused.expect("a refusal").contains("inversion = \"allow\""));
+}

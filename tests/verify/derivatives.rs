@@ -2,12 +2,14 @@
 //!
 //! Along a direction, since det F is linear in each single entry: entrywise differences would be exact and show no order.
 
-use cutis::effect::{DeadLoad, Elements, Gravity, Inertia, LAWS, Muscle, Pressure};
+use cutis::effect::{
+    DeadLoad, Elements, Gravity, Inertia, LAWS, Measure, Muscle, Pressure, damping_memory, stiffness_damping,
+};
 use cutis::energy::{
     Corotational, Energy, Fung, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, StableNeoHookean,
     Stretches, VerondaWestmann, WithBulk, Yeoh,
 };
-use cutis::fem::{At, Curvature, HessianSink, Term, add_midsides};
+use cutis::fem::{At, Curvature, Difference, HessianSink, Term, add_midsides};
 use cutis::math::{Mat3, Vec3, vec9};
 use cutis::mesh::TetMesh;
 
@@ -134,7 +136,8 @@ pub fn check_term_at(term: &dyn Term, rest: &[Vec3], seed: u64, history: &[f64])
     let inputs: Vec<f64> = (0..8).map(|_| random.number()).collect();
     let x_tilde: Vec<Vec3> = rest.iter().map(|X| X + 0.2 * random.vector()).collect();
     let x_lag: Vec<Vec3> = rest.iter().map(|X| X + 0.2 * random.vector()).collect();
-    let at = At { t: 0.1, dt: 0.3, inputs: &inputs, history, x_tilde: &x_tilde, x_lag: &x_lag };
+    let at =
+        At { t: 0.1, dt: 0.3, inertia: 7.0, inputs: &inputs, history, x_tilde: &x_tilde, x_lag: &x_lag, ..At::NOWHERE };
     for _ in 0..10 {
         let x: Vec<Vec3> = rest.iter().map(|X| X + 0.1 * random.vector()).collect();
         let d: Vec<Vec3> = x.iter().map(|_| random.vector()).collect();
@@ -175,6 +178,50 @@ fn terms_have_the_derivatives_they_claim() {
     check_term(&Inertia { m }, &rest, SEED + 2);
     check_term(&DeadLoad { shares: vec![(1, 0.25), (4, 0.75)], input: 1 }, &rest, SEED + 3);
     check_term(&Pressure { triangles: vec![[0, 1, 2], [1, 4, 2]], input: 3 }, &rest, SEED + 4);
+}
+
+/// Stiffness damping with a past.
+fn check_damping(measure: Measure, planted: f64) {
+    let rest = REST.map(Vec3::from);
+    let elements = Elements { X: &rest, tets: &TETS, midsides: &[] };
+    let term = elements.of(stiffness_damping(lame(), measure, 0));
+    let mut random = Random(SEED + 7);
+    let history: Vec<f64> = (0..damping_memory(&elements)).map(|_| 0.1 * random.number()).collect();
+    let at = At { dt: 0.3, difference: Difference::new(0.3, 0.2), history: &history, ..At::NOWHERE };
+    let x: Vec<Vec3> = rest.iter().map(|X| X + 0.1 * random.vector()).collect();
+    let [d, w] = [0, 1].map(|_| x.iter().map(|_| random.vector()).collect::<Vec<_>>());
+    let dot = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
+    let moved = |h: f64| x.iter().zip(&d).map(|(x, d)| x + h * d).collect::<Vec<_>>();
+    let gradient = |x: &[Vec3]| {
+        let mut g = vec![Vec3::zeros(); x.len()];
+        let energy = term.add_gradient(&at, x, &mut g);
+        assert!((energy - term.energy(&at, x)).abs() <= 1e-12 * energy.abs().max(1.0));
+        g
+    };
+    let g = gradient(&x);
+    let first = order(dot(&g, &d) + planted, dot(&g, &g).sqrt(), |h| {
+        (term.energy(&at, &moved(h)) - term.energy(&at, &moved(-h))) / (2.0 * h)
+    });
+    assert!(ORDER.contains(&first), "{measure:?}: gradient of order {first:.3}");
+    let mut H = Dense(vec![vec![Mat3::zeros(); x.len()]; x.len()]);
+    term.add_hessian(&at, &x, Curvature::Exact, &mut H);
+    let Hd: Vec<Vec3> = H.0.iter().map(|row| row.iter().zip(&d).map(|(H, d)| H * d).sum()).collect();
+    let second = order(dot(&w, &Hd), dot(&Hd, &Hd).sqrt(), |h| {
+        (dot(&gradient(&moved(h)), &w) - dot(&gradient(&moved(-h)), &w)) / (2.0 * h)
+    });
+    assert!(ORDER.contains(&second), "{measure:?}: Hessian of order {second:.3}");
+}
+
+#[test]
+fn stiffness_damping_has_the_derivatives_it_claims() {
+    check_damping(Measure::Finite, 0.0);
+    check_damping(Measure::Small, 0.0);
+}
+
+#[test]
+#[should_panic]
+fn a_planted_error_in_damping_is_found() {
+    check_damping(Measure::Finite, 0.1);
 }
 
 #[test]

@@ -125,3 +125,273 @@ fn damaged_states_are_refused() {
     let other = crate::common::sim(&format!("{BAR}[[bone]]\nname = \"root\"\nnodes = \"z_max\"\n"));
     assert!(State::from_bytes(&bytes, other.model()).unwrap_err().to_string().contains("belongs to model"));
 }
+
+/// A scheme and its order.
+const SCHEMES: [(&str, f64); 5] = [
+    ("scheme = \"backward-euler\"", 1.0),
+    ("scheme = \"bdf2\"", 2.0),
+    ("scheme = \"generalised-alpha\"\nrho = 0.5", 2.0),
+    ("scheme = \"generalised-alpha\"", 2.0),
+    ("scheme = \"implicit-midpoint\"", 2.0),
+];
+/// A small soft bar under a load that grows smoothly.
+const SWUNG: &str = "[mesh.block]\nsize = [0.02, 0.02, 0.04]\ncells = [1, 1, 2]\n[solver]\nmethod = \"newton\"\n\
+                     tolerance = 1e-11\n[[bone]]\nname = \"root\"\nnodes = \"z_min\"\n[gravity]\nacceleration = [0, 0, 0]\n";
+/// Lengths of steps in turn, of mean 1.
+const EVEN: &[f64] = &[1.0];
+const UNEVEN: &[f64] = &[1.0, 2.0, 0.5, 0.5];
+
+/// The skin after 0.08 s in `n` steps.
+fn swing(scheme: &str, tissue: &str, lengths: &[f64], n: usize) -> Vec<f64> {
+    let mut sim = sim(&format!("{SWUNG}{tissue}[inertia]\nstart = \"rest\"\n{scheme}\n"));
+    sim.initialise().expect("rest");
+    let mut t = 0.0;
+    for k in 0..n {
+        let dt = 0.08 / n as f64 * lengths[k % lengths.len()];
+        t += dt;
+        let g = 20.0 * (30.0 * t).sin().powi(2);
+        set(&mut sim, "gravity", 0, &[g, 0.3 * g, 0.0]);
+        sim.step(dt).expect("a swing");
+    }
+    get(&sim, "skin.position")
+}
+
+fn order(scheme: &str, tissue: &str, lengths: &[f64]) -> f64 {
+    let x = [128, 256, 512].map(|n| swing(scheme, tissue, lengths, n));
+    let apart = |a: &[f64], b: &[f64]| largest(a.iter().zip(b).map(|(a, b)| a - b));
+    (apart(&x[0], &x[1]) / apart(&x[1], &x[2])).log2()
+}
+
+const SOFT: &str = "[[tissue]]\nenergy = \"stable-neo-hookean\"\nE = 3e3\nnu = 0.3\n";
+const VISCOUS: &str = "[tissue.viscous]\ng = [0.6]\ntau = [0.02]\n";
+
+#[test]
+fn each_scheme_shows_its_order() {
+    for (scheme, wanted) in SCHEMES {
+        for (tissue, lengths, damping) in [
+            (SOFT.to_owned(), EVEN, ""),
+            (SOFT.to_owned(), UNEVEN, ""),
+            (SOFT.to_owned(), UNEVEN, "damping_mass = 5.0\ndamping_stiffness = 0.002"),
+            (format!("{SOFT}{VISCOUS}"), EVEN, ""),
+        ] {
+            let found = order(&format!("{scheme}\n{damping}"), &tissue, lengths);
+            assert!(
+                (found - wanted).abs() < 0.15,
+                "{scheme}\n{damping}\n{tissue}{lengths:?}: order {found:.3}, wanted {wanted}"
+            );
+        }
+    }
+}
+
+#[test]
+#[should_panic]
+fn backward_euler_is_not_of_second_order() {
+    assert!((order(SCHEMES[0].0, SOFT, EVEN) - 2.0).abs() < 0.15);
+}
+
+/// Energy of a bar of the linear law that is plucked and left to ring: at the first free step, and after `n` more.
+fn ringing(scheme: &str, n: usize) -> [f64; 2] {
+    let text =
+        format!("{SWUNG}[[tissue]]\nenergy = \"linear\"\nE = 3e3\nnu = 0.3\n[inertia]\nstart = \"rest\"\n{scheme}\n");
+    let mut sim = sim(&text);
+    sim.initialise().expect("rest");
+    set(&mut sim, "bone.translation", 0, &[2e-3, 0.0, 0.0]);
+    let energy = |sim: &Sim| get(sim, "energy.elastic")[0] + get(sim, "energy.kinetic")[0];
+    (0..3).for_each(|_| drop(sim.step(1e-3).expect("a pluck")));
+    let first = energy(&sim);
+    (0..n).for_each(|_| drop(sim.step(1e-3).expect("ringing")));
+    [first, energy(&sim)]
+}
+
+#[test]
+fn the_midpoint_rule_keeps_the_energy_of_a_linear_problem() {
+    let [first, last] = ringing("scheme = \"implicit-midpoint\"", 1000);
+    assert!((last / first - 1.0).abs() < 1e-6, "{first:.6e} J became {last:.6e} J");
+    for (scheme, left) in
+        [("scheme = \"backward-euler\"", 0.2..0.5), ("scheme = \"generalised-alpha\"\nrho = 0.5", 0.8..0.9999)]
+    {
+        let [first, last] = ringing(scheme, 400);
+        assert!(left.contains(&(last / first)), "{scheme}: {first:.6e} J became {last:.6e} J");
+    }
+}
+
+#[test]
+fn every_scheme_repeats_its_bits() {
+    for (scheme, _) in SCHEMES {
+        // A force-driven bone as well: its curvature depends on where inertia carries it.
+        let scene = format!(
+            "{BAR}{scheme}\ndamping_mass = 2.0\ndamping_stiffness = 1e-3\n[[bone]]\nname = \"root\"\nnodes = \"z_min\"\n[[bone]]\nname = \"plate\"\n\
+             nodes = \"z_max\"\ndrive = \"force\"\n[gravity]\n"
+        );
+        let go = |sim: &mut Sim, k: usize| {
+            set(sim, "bone.force", 3, &[0.1 * (k as f64).sin(), 0.02, 0.0]);
+            sim.step([0.01, 0.004, 0.02][k % 3]).expect("a dynamic step");
+        };
+        let mut straight = sim(&scene);
+        straight.initialise().expect("rest");
+        (0..7).for_each(|k| go(&mut straight, k));
+        let bytes = straight.save().to_bytes(straight.model());
+        let mut other = sim(&scene);
+        let state = State::from_bytes(&bytes, other.model()).expect("bytes of the same model");
+        assert_eq!(state, straight.save());
+        other.restore(&state).expect("a state of the same model");
+        for sim in [&mut straight, &mut other] {
+            (7..15).for_each(|k| go(sim, k));
+        }
+        assert_eq!(straight.save().to_bytes(straight.model()), other.save().to_bytes(other.model()), "{scheme}");
+    }
+}
+
+#[test]
+fn bones_do_not_ring_in_any_scheme() {
+    // A bone that sets off evenly: the reaction of its tissue's mass is that of one jolt, then none.
+    for (scheme, _) in SCHEMES {
+        let mut sim = sim(&format!("{SWUNG}{SOFT}[inertia]\nstart = \"rest\"\n{scheme}\ndamping_stiffness = 0.01\n"));
+        sim.initialise().expect("rest");
+        let mut kinetic = Vec::new();
+        for k in 1..=400 {
+            set(&mut sim, "bone.translation", 0, &[2e-4 * f64::from(k), 0.0, 0.0]);
+            sim.step(2e-2).expect("an even motion");
+            kinetic.push(get(&sim, "energy.kinetic")[0]);
+        }
+        // All 16 g at 1 cm/s.
+        assert!((kinetic[399] - 0.5 * 0.016 * 1e-4).abs() < 1e-10, "{scheme}: {:e}", kinetic[399]);
+    }
+}
+
+/// Damping in units of the critical one and angular frequency (rad/s) of the slowest sway of a bar let go; its mesh is
+/// mirrored, so that it sways in one plane.
+fn sway(law: &str, damping: &str) -> (f64, f64) {
+    let mut sim = sim(&format!(
+        "[mesh.block]\nsize = [0.01, 0.01, 0.06]\ncells = [1, 1, 3]\npattern = \"forty-eight\"\n[solver]\ntolerance = 1e-10\n[[bone]]\n\
+         name = \"root\"\nnodes = \"z_min\"\n[gravity]\nacceleration = [0.2, 0, 0]\n[[tissue]]\nenergy = \"{law}\"\n\
+         E = 20e3\nnu = 0.3\n[inertia]\nstart = \"equilibrium\"\nscheme = \"bdf2\"\n{damping}\n"
+    ));
+    sim.initialise().expect("bent by gravity");
+    set(&mut sim, "gravity", 0, &[0.0; 3]);
+    let rest = get(&sim, "skin.restPosition");
+    let k = 3 * (0..rest.len() / 3).max_by(|a, b| rest[3 * a + 2].total_cmp(&rest[3 * b + 2])).expect("a tip");
+    let (dt, mut before, mut crossings) = (1e-3, 1.0, Vec::new());
+    for step in 0..20_000 {
+        sim.step(dt).expect("a sway");
+        let u = get(&sim, "skin.position")[k] - rest[k];
+        if before < 0.0 && u >= 0.0 {
+            crossings.push((dt * f64::from(step), get(&sim, "energy.elastic")[0] + get(&sim, "energy.kinetic")[0]));
+        }
+        before = u;
+        if crossings.len() == 11 {
+            break;
+        }
+    }
+    // The first ones hold faster motions, too. Energy decays twice as fast as motion.
+    let ((t0, e0), (t1, e1)) = (crossings[2], crossings[10]);
+    let (decay, w) = ((e0 / e1).ln() / 16.0, 8.0 * std::f64::consts::TAU / (t1 - t0));
+    (decay / decay.hypot(std::f64::consts::TAU), w)
+}
+
+#[test]
+fn rayleigh_damping_has_its_ratio() {
+    for law in ["linear", "stable-neo-hookean"] {
+        for (a, b) in [(0.8, 0.0), (0.0, 2e-3), (0.5, 1e-3)] {
+            let (zeta, w) = sway(law, &format!("damping_mass = {a:?}\ndamping_stiffness = {b:?}"));
+            let wanted = 0.5 * (a / w + b * w);
+            println!("{law}, a {a}, b {b}: w {w:.2} rad/s, zeta {zeta:.5}, formula {wanted:.5}");
+            assert!((zeta - wanted).abs() < 0.02 * wanted, "{law}, a {a}, b {b}: {zeta} against {wanted} at {w} rad/s");
+        }
+    }
+}
+
+#[test]
+fn stiffness_damping_feels_no_rotation() {
+    // A bar carried round by its bone: damping that felt rotations would hold it back and turn the bone's torque.
+    let torque = |damping: &str| {
+        let mut sim = sim(&format!(
+            "{SWUNG}[[tissue]]\nenergy = \"corotational\"\nE = 15e3\nnu = 0.3\n[inertia]\nstart = \"rest\"\nscheme = \"bdf2\"\n{damping}\n"
+        ));
+        sim.initialise().expect("rest");
+        let mut angle = 0.0;
+        for k in 0..600 {
+            angle += 0.01 * (f64::from(k) / 300.0).min(1.0);
+            set(&mut sim, "bone.rotation", 0, &[0.0, 0.0, angle]);
+            sim.step(0.01).expect("a turn");
+        }
+        get(&sim, "bone.reactionTorque")[2]
+    };
+    let (free, damped) = (torque(""), torque("damping_stiffness = 0.05"));
+    let felt = torque("damping_mass = 5.0");
+    assert!((free - damped).abs() < 1e-3 * (free - felt).abs(), "{free:e} {damped:e} {felt:e}");
+}
+
+/// A bar that is jerked, then left to itself: skin after every host step of 0.02 s, and all pieces of time taken.
+fn jerked(inertia: &str, cuts: u32) -> (Vec<Vec<f64>>, u32, f64) {
+    let mut sim = sim(&format!("{SWUNG}{SOFT}[inertia]\nstart = \"rest\"\ndamping_mass = 8.0\n{inertia}\n"));
+    sim.initialise().expect("rest");
+    let (mut skins, mut pieces, mut worst) = (Vec::new(), 0, 0.0_f64);
+    for k in 0..50 {
+        for cut in 1..=cuts {
+            let t = (f64::from(k) + f64::from(cut) / f64::from(cuts)) / 2.0;
+            set(&mut sim, "bone.translation", 0, &[4e-3 * t.min(1.0), 0.0, 0.0]);
+            let report = sim.step(0.02 / f64::from(cuts)).expect("a step");
+            assert!(report.warnings.is_empty(), "{:?}", report.warnings);
+            pieces += report.substeps;
+            worst = worst.max(report.time_error);
+        }
+        skins.push(get(&sim, "skin.position"));
+    }
+    (skins, pieces, worst)
+}
+
+fn farthest(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    largest(a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a - b))
+}
+
+#[test]
+fn steps_are_cut_as_accuracy_asks() {
+    let truth = jerked("scheme = \"generalised-alpha\"", 256).0;
+    for (scheme, _) in &SCHEMES[..4] {
+        let mut errors = Vec::new();
+        for accuracy in [8e-6, 1e-6] {
+            let (skins, pieces, worst) = jerked(&format!("{scheme}\naccuracy = {accuracy:e}"), 1);
+            assert!(worst <= accuracy, "{scheme}: a piece of error {worst:e}");
+            let error = farthest(&skins, &truth);
+            let even = farthest(&jerked(scheme, pieces.div_ceil(50)).0, &truth);
+            println!(
+                "{scheme}, accuracy {accuracy:e}: {pieces} pieces, off by {error:.1e} m, even ones by {even:.1e} m"
+            );
+            // Each piece adds its own error, and time is spent where it is needed.
+            assert!(error < f64::from(pieces) * accuracy, "{scheme}, {accuracy:e}: off by {error:e} m");
+            assert!(error < even, "{scheme}, {accuracy:e}: {error:e} m, even pieces {even:e} m");
+            errors.push(error);
+        }
+        assert!(errors[1] < 0.5 * errors[0], "{scheme}: {errors:?}");
+    }
+}
+
+#[test]
+fn accuracy_repeats_its_bits_and_is_told_where_it_fails() {
+    let scene = format!("{SWUNG}{SOFT}[inertia]\nstart = \"rest\"\nscheme = \"bdf2\"\naccuracy = 1e-6\n");
+    let go = |sim: &mut Sim, k: usize| {
+        set(sim, "bone.translation", 0, &[2e-3 * (k as f64).sin(), 0.0, 0.0]);
+        sim.step(0.02).expect("a step")
+    };
+    let mut straight = sim(&scene);
+    straight.initialise().expect("rest");
+    let pieces: u32 = (0..6).map(|k| go(&mut straight, k).substeps).sum();
+    assert!(pieces > 12, "{pieces} pieces");
+    let bytes = straight.save().to_bytes(straight.model());
+    let mut other = sim(&scene);
+    other.restore(&State::from_bytes(&bytes, other.model()).expect("its bytes")).expect("its state");
+    for sim in [&mut straight, &mut other] {
+        (6..12).for_each(|k| drop(go(sim, k)));
+    }
+    assert_eq!(straight.save().to_bytes(straight.model()), other.save().to_bytes(other.model()));
+
+    let mut rough = sim(&scene.replace("1e-6", "1e-9"));
+    rough.initialise().expect("rest");
+    set(&mut rough, "bone.translation", 0, &[5e-3, 0.0, 0.0]);
+    let report = rough.step(0.5).expect("a step that is too long");
+    assert!(report.substeps <= 512 && report.warnings.iter().any(|w| w.contains("accuracy")), "{report:?}");
+    let coarse = format!("{SWUNG}{SOFT}[inertia]\naccuracy = 5e-11\n");
+    let message = cutis::load::from_text(&coarse, None).err().expect("below the solver's tolerance").to_string();
+    assert!(message.contains("accuracy") && message.contains("ten times"), "{message}");
+}

@@ -45,7 +45,7 @@ fn fibres_limits_and_tension_have_the_derivatives_they_claim() {
 fn strain_limits_have_the_derivatives_they_claim() {
     let limit = StrainLimit { longest: 1.3, shortest: 0.8, band: 0.1, stiffness: 2.0 };
     let law = Limits(vec![limit]);
-    let at = At::rest();
+    let at = At::NOWHERE;
     let mut random = Random(SEED);
     for k in 0..40 {
         let spread = if k % 2 == 0 { 0.4 } else { 1.2 };
@@ -83,7 +83,7 @@ fn damage_has_the_derivatives_it_claims_and_never_heals() {
     // Out and back: the loop takes energy, the way back is softer, the stored energy never grows by itself.
     for k in 0..=400 {
         let l = 1.0 + 0.8 * if k <= 200 { k as f64 / 200.0 } else { (400 - k) as f64 / 200.0 };
-        let at = At { history: &history, ..At::rest() };
+        let at = At { history: &history, ..At::NOWHERE };
         let P = damaged.psi_and_P(&at, 0, &stretch(l)).1[(0, 0)];
         work += 0.5 * (P + last.1) * (l - last.0);
         assert!(work > -1e-9, "energy was created: {work}");
@@ -99,7 +99,7 @@ fn damage_has_the_derivatives_it_claims_and_never_heals() {
 
 #[test]
 fn fibres_are_slack_below_the_crimp_and_objective() {
-    let at = At::rest();
+    let at = At::NOWHERE;
     let fibre = Fibre { direction: vec![Vec3::x()], k1: 2.0, k2: 1.5, kappa: 0.0, slack: 1.1 };
     let stretch = |l: f64| Mat3::from_diagonal(&Vec3::new(l, 1.0, 1.0));
     assert_eq!(fibre.psi(&at, 0, &stretch(1.0999)), 0.0);

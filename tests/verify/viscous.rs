@@ -32,7 +32,7 @@ impl Probe {
     /// Goes to F within dt and returns the overstress P there.
     fn go(&mut self, dt: f64, F: &Mat3) -> Mat3 {
         let x = CORNERS.map(|x| F * Vec3::from(x));
-        let at = At { t: 0.0, dt, inputs: &[], history: &self.history, x_tilde: &[], x_lag: &[] };
+        let at = At { dt, history: &self.history, ..At::NOWHERE };
         let mut g = [Vec3::zeros(); 4];
         self.term.add_gradient(&at, &x, &mut g);
         let mut after = vec![0.0; self.memory];
@@ -119,7 +119,7 @@ fn overstress_has_the_derivatives_it_claims() {
         for _ in 0..3 {
             probe.go(0.07, &(Mat3::identity() + 0.2 * random.matrix()));
         }
-        let at = At { t: 0.0, dt: 0.05, inputs: &[], history: &probe.history, x_tilde: &[], x_lag: &[] };
+        let at = At { dt: 0.05, history: &probe.history, ..At::NOWHERE };
         let x: Vec<Vec3> = CORNERS.iter().map(|x| Vec3::from(*x) + 0.1 * random.vector()).collect();
         let d: Vec<Vec3> = CORNERS.iter().map(|_| random.vector()).collect();
         let moved = |h: f64| x.iter().zip(&d).map(|(x, d)| x + h * d).collect::<Vec<_>>();
