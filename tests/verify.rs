@@ -15,6 +15,8 @@ mod invariants;
 mod loads;
 #[path = "verify/locking.rs"]
 mod locking;
+#[path = "verify/mms.rs"]
+mod mms;
 #[path = "verify/patch.rs"]
 mod patch;
 #[path = "verify/rigid.rs"]
