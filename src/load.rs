@@ -92,7 +92,8 @@ fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, E
     let file = parse(text, path)?;
     let mesh = mesh_of(text, &file, path, folder)?;
     let order = file.order().map_or(String::new(), |order| format!("order = {order}\n"));
-    let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n{order}"));
+    let curved = if file.curved() { "curved = true\n" } else { "" };
+    let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n{order}{curved}"));
     Ok(Baked { scene: replaced, mesh: io::encode(&mesh) })
 }
 

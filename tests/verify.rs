@@ -23,6 +23,8 @@ mod patch;
 mod rigid;
 #[path = "verify/scenes.rs"]
 mod scenes;
+#[path = "verify/sphere.rs"]
+mod sphere;
 #[path = "verify/time.rs"]
 mod time;
 #[path = "verify/viscous.rs"]

@@ -3,6 +3,7 @@
 #![allow(non_snake_case)]
 
 mod assemble;
+mod curved;
 mod dofs;
 mod matrix;
 mod quadratic;
@@ -12,6 +13,7 @@ mod tet10;
 mod tet4;
 
 pub use assemble::Assembly;
+pub use curved::{Curving, curve_midsides};
 pub use dofs::{Configuration, Dofs, RigidBody, Role};
 pub use matrix::{BlockMatrix, CouplingMatrix, Pattern};
 pub use quadratic::{EDGES, add_midsides};

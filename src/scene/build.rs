@@ -8,7 +8,7 @@ use super::materials::{Tissue, stand_in};
 use super::place::nearest_point;
 use super::programme::Programme;
 use crate::effect::{Gravity, Inertia, lumped_masses};
-use crate::fem::add_midsides;
+use crate::fem::{Curving, add_midsides, curve_midsides};
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::Slot;
 use crate::sim::{self, Drive, Layout, Marker, Model, ModelParts};
@@ -61,6 +61,17 @@ impl Builder<'_> {
                 return Err(self.text.at(at, format!("`order` of [mesh] is {found}; wanted 1 or 2")));
             }
         };
+        if let Some(curved) = mesh_spec.get_ref().curved.as_ref().filter(|c| *c.get_ref()) {
+            if midsides.is_empty() {
+                let message = "`curved` of [mesh] bends the edges of quadratic elements: it wants order = 2".to_owned();
+                return Err(self.text.at(curved.span().start, message));
+            }
+            let Curving { curved, straightened } = curve_midsides(&mut mesh, &midsides);
+            if straightened > 0 {
+                let all = curved + straightened;
+                warnings.push(format!("{straightened} of {all} curved edges were left straight: an element would fold"));
+            }
+        }
         let Tissue { mut terms, density, n_history } = self.tissue(file, &mesh, &midsides, &mut warnings)?;
         let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
         let mut bones = self.bones(bone, &mesh, rings)?;

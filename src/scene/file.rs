@@ -42,6 +42,7 @@ pub struct MeshSpec {
     pub head: Option<HeadSpec>,
     pub block: Option<BlockSpec>,
     pub order: Option<Spanned<u32>>,
+    pub curved: Option<Spanned<bool>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

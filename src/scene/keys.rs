@@ -110,6 +110,7 @@ pub const KEYS: &[Key] = &[
     key("mesh", "head", "table", "", Any, "none", "The synthetic head."),
     key("mesh", "block", "table", "", Any, "none", "A box."),
     key("mesh", "order", "integer", "", From(1.0, 3.0), "1", "Linear tetrahedra (1), or quadratic ones with a node on every edge (2): eight times the unknowns of a mesh, far more accurate for each of them."),
+    key("mesh", "curved", "boolean", "", Any, "false", "With `order = 2`: edges on smooth surfaces are bent to the surface that the normals tell, so that the shape, too, is of order 2."),
     key("mesh.head", "edge", "float", "m", From(0.002, 0.012), "0.0078", "Edge of the lattice cell."),
     key("mesh.block", "origin", "[float; 3]", "m", Any, "[0, 0, 0]", "Corner with the smallest coordinates."),
     key("mesh.block", "size", "[float; 3]", "m", Positive, "required", "Edge lengths."),

@@ -36,6 +36,11 @@ impl SceneFile {
         self.mesh.get_ref().order.as_ref().map(|o| *o.get_ref())
     }
 
+    /// Whether surface edges of quadratic elements are bent.
+    pub fn curved(&self) -> bool {
+        self.mesh.get_ref().curved.as_ref().is_some_and(|c| *c.get_ref())
+    }
+
     /// Where the mesh comes from.
     ///
     /// # Errors
