@@ -5,6 +5,8 @@
 mod common;
 #[path = "verify/derivatives.rs"]
 mod derivatives;
+#[path = "verify/embedding.rs"]
+mod embedding;
 #[path = "verify/golden.rs"]
 mod golden;
 #[path = "verify/head.rs"]

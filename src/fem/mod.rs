@@ -5,6 +5,8 @@
 mod assemble;
 mod curved;
 mod dofs;
+mod embedding;
+mod locate;
 mod matrix;
 mod quadratic;
 mod solid;
@@ -15,6 +17,8 @@ mod tet4;
 pub use assemble::Assembly;
 pub use curved::{Curving, curve_midsides};
 pub use dofs::{Configuration, Dofs, RigidBody, Role};
+pub use embedding::{Detached, Embedding};
+pub use locate::{Found, Locator};
 pub use matrix::{BlockMatrix, CouplingMatrix, Pattern};
 pub use quadratic::{EDGES, add_midsides};
 pub use solid::{Elastic, Material, Point, Solid};

@@ -48,8 +48,21 @@ pub(super) fn jacobian(X: &[Vec3; 10], L: [f64; 4]) -> Mat3 {
     X.iter().zip(&reference_gradients(L)).map(|(X, d)| X * d.transpose()).sum()
 }
 
+/// dL/dX: the inverse of [`jacobian`].
+pub(super) fn inverse_jacobian(X: &[Vec3; 10], L: [f64; 4]) -> Mat3 {
+    jacobian(X, L).try_inverse().expect("rest volumes are positive")
+}
+
+/// Values of the shape functions at barycentric coordinates `L`.
+pub(super) fn values(L: [f64; 4]) -> [f64; 10] {
+    std::array::from_fn(|k| match k {
+        0..4 => L[k] * (2.0 * L[k] - 1.0),
+        _ => 4.0 * L[EDGES[k - 4][0]] * L[EDGES[k - 4][1]],
+    })
+}
+
 /// Derivatives of the shape functions by the barycentric coordinates L1, L2, L3 (L0 = 1 - L1 - L2 - L3).
-fn reference_gradients(L: [f64; 4]) -> [Vec3; 10] {
+pub(super) fn reference_gradients(L: [f64; 4]) -> [Vec3; 10] {
     let dL = [Vec3::repeat(-1.0), Vec3::x(), Vec3::y(), Vec3::z()];
     let mut dN = [Vec3::zeros(); 10];
     for i in 0..4 {

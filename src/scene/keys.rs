@@ -94,6 +94,7 @@ const NU_LIMIT: f64 = 0.5;
 pub const KEYS: &[Key] = &[
     key("", "name", "string", "", Any, "\"scene\"", "Name of the scene; stands in the model description."),
     key("", "mesh", "table", "", Any, "required", "Where the tissue comes from: exactly one of `file`, `head`, `block`."),
+    key("", "skin", "table", "", Any, "none", "A finer skin that rides on the mesh, for hosts to read: exactly one of `file`, `edge`, `subdivisions`. Loads stay on the mesh."),
     key("", "tissue", "array of tables", "", Any, "required", "Materials; each region of the mesh takes the first that names it."),
     key("", "bone", "array of tables", "", Any, "none", "Bones that hold or move the tissue."),
     key("", "muscle", "array of tables", "", Any, "none", "Muscles that the host activates."),
@@ -117,6 +118,9 @@ pub const KEYS: &[Key] = &[
     key("mesh.block", "cells", "[integer; 3]", "", AtLeastOne, "required", "Cells along x, y and z."),
     key("mesh.block", "pattern", "string", "", OneOf(&["six", "forty-eight"]), "\"six\"", "Tetrahedra of a cell: six about a diagonal, or 48 in eight mirrored cubes."),
     key("mesh.block", "layers", "array of [string, float]", "", Any, "[]", "Layers from z_max down: region name and share of the height; the rest is `tissue`."),
+    key("skin", "file", "string", "", Any, "none", "Triangle surface (`.msh`, `.vtu`, `.vtk`), relative to the scene."),
+    key("skin", "edge", "float", "m", From(0.002, 0.012), "none", "The synthetic head's skin at this edge of the lattice cell."),
+    key("skin", "subdivisions", "integer", "", From(1.0, 6.0), "none", "The mesh's own skin with each triangle cut in four this many times."),
     key("tissue", "regions", "array of strings", "", Any, "all regions", "Regions of the mesh made of this material."),
     key("tissue", "energy", "string", "", OneOf(&["linear", "corotational", "st-venant-kirchhoff", "stable-neo-hookean", "neo-hookean", "mooney-rivlin", "yeoh", "fung", "veronda-westmann", "ogden"]), "\"stable-neo-hookean\"", "Strain energy density; it decides which constants below are wanted (see theory.md)."),
     key("tissue", "E", "float", "Pa", Positive, "of the law", "Young's modulus at small strain."),

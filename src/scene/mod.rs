@@ -20,7 +20,7 @@ pub use build::build;
 pub use file::SceneFile;
 pub use keys::{KEYS, Key, Range, key_reference, tables};
 pub use programme::{Programme, Setting};
-pub use source::MeshSource;
+pub use source::{MeshSource, SkinSource};
 
 /// Why a scene was refused; line and column are 1-based.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -6,11 +6,13 @@ mod access;
 mod model;
 mod ports;
 mod recover;
+mod skin;
 mod state;
 mod step;
 
 pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
 pub use ports::Layout;
+pub use skin::Skin;
 pub use state::{State, StateError};
 pub use step::StepReport;
 

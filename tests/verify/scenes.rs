@@ -55,7 +55,7 @@ fn slips_are_answered_with_line_column_and_choices() {
 /// What a component is made of is the scene itself: mesh, elements, everything that the token hashes.
 #[test]
 fn a_packed_scene_is_the_scene() {
-    for name in ["curved", "order_2", "layers"] {
+    for name in ["curved", "order_2", "layers", "skin"] {
         let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/").to_owned() + name + ".toml";
         let scene = std::path::Path::new(&scene);
         let plain = cutis::load::from_file(scene).expect("a scene").model;

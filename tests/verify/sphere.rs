@@ -89,6 +89,7 @@ pub fn shell(times: u32, layers: usize) -> TetMesh {
         ],
         nodes,
         tets,
+        fine_skin: None,
     }
     .checked()
     .expect("a shell")
