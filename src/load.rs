@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use crate::error::Error;
 use crate::geometry::{Block, Head, Pattern, block};
 use crate::io;
-use crate::mesh::TetMesh;
-use crate::scene::{MeshSource, Programme, SceneError, SceneFile, build};
+use crate::mesh::{FineSkin, TetMesh};
+use crate::scene::{MeshSource, Programme, SceneError, SceneFile, SkinSource, build};
 use crate::sim::Model;
 
 /// The scene that stands in the library itself: the synthetic head.
@@ -92,7 +92,8 @@ fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, E
     let file = parse(text, path)?;
     let mesh = mesh_of(text, &file, path, folder)?;
     let order = file.order().map_or(String::new(), |order| format!("order = {order}\n"));
-    let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n{order}"));
+    let curved = if file.curved() { "curved = true\n" } else { "" };
+    let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n{order}{curved}"));
     Ok(Baked { scene: replaced, mesh: io::encode(&mesh) })
 }
 
@@ -116,8 +117,8 @@ fn load(text: &str, path: &Path, folder: Option<&Path>) -> Result<Loaded, Error>
 }
 
 fn mesh_of(text: &str, file: &SceneFile, path: &Path, folder: Option<&Path>) -> Result<TetMesh, Error> {
-    Ok(match file.mesh_source(text).map_err(|e| scene_error(path, e))? {
-        MeshSource::File(name) => io::read_mesh(&folder.map_or_else(|| PathBuf::from(&name), |f| f.join(&name)))?,
+    let mut mesh = match file.mesh_source(text).map_err(|e| scene_error(path, e))? {
+        MeshSource::File(name) => io::read_mesh(&beside(folder, &name))?,
         MeshSource::Block { origin, size, cells, forty_eight, layers } => {
             let pattern = if forty_eight { Pattern::FortyEight } else { Pattern::Six };
             block(&Block { origin, size, cells, pattern, layers })?
@@ -126,17 +127,31 @@ fn mesh_of(text: &str, file: &SceneFile, path: &Path, folder: Option<&Path>) -> 
             let standard = Head::default();
             Head { edge: edge.unwrap_or(standard.edge), ..standard }.mesh()?.0
         }
-    })
+    };
+    if let Some(source) = file.skin_source(text).map_err(|e| scene_error(path, e))? {
+        mesh.fine_skin = Some(match source {
+            SkinSource::File(name) => io::read_surface(&beside(folder, &name))?,
+            SkinSource::Head { edge } => FineSkin::of(&Head { edge, ..Head::default() }.mesh()?.0),
+            SkinSource::Subdivided(times) => (0..times).fold(FineSkin::of(&mesh), |skin, _| skin.subdivided()),
+        });
+    }
+    Ok(mesh)
 }
 
-/// `text` with its `[mesh...]` tables replaced; the new table stands where the first one stood.
+fn beside(folder: Option<&Path>, name: &str) -> PathBuf {
+    folder.map_or_else(|| PathBuf::from(name), |f| f.join(name))
+}
+
+/// `text` with its `[mesh...]` tables replaced and without a `[skin]`, which the baked mesh carries; the new table stands where the first one stood.
 fn replace_mesh_table(text: &str, table: &str) -> String {
     let mut out = String::new();
     let (mut inside, mut written) = (false, false);
     for line in text.lines() {
         if line.trim_start().starts_with('[') {
-            inside = line.trim_start().trim_start_matches('[').trim_start().starts_with("mesh");
-            if inside && !written {
+            let name = line.trim_start().trim_start_matches('[').trim_start();
+            let is_mesh = name.starts_with("mesh");
+            inside = is_mesh || name.starts_with("skin");
+            if is_mesh && !written {
                 out += table;
                 written = true;
             }

@@ -24,6 +24,15 @@ pub struct FaceSet {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// A triangle surface that rides on the tissue: a skin finer than the mesh it is bound to.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FineSkin {
+    /// Rest positions of its vertices, m.
+    pub vertices: Vec<Vec3>,
+    /// Corner vertices of each triangle, wound outward.
+    pub triangles: Vec<[u32; 3]>,
+}
+
 /// Tetrahedra in rest position with everything a scene can refer to by name.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TetMesh {
@@ -39,6 +48,8 @@ pub struct TetMesh {
     pub node_sets: Vec<NodeSet>,
     /// Named boundary face sets.
     pub face_sets: Vec<FaceSet>,
+    /// The skin that hosts read instead of the face set [`SKIN`], if there is one.
+    pub fine_skin: Option<FineSkin>,
 }
 
 /// Why a mesh was refused.
@@ -109,6 +120,58 @@ pub fn signed_volume(x: [Vec3; 4]) -> f64 {
     (x[1] - x[0]).cross(&(x[2] - x[0])).dot(&(x[3] - x[0])) / 6.0
 }
 
+impl FineSkin {
+    /// Leaves out vertices that no triangle uses; the others keep their order.
+    pub fn drop_unused(&mut self) {
+        let mut new = vec![u32::MAX; self.vertices.len()];
+        self.triangles.as_flattened().iter().for_each(|&a| new[a as usize] = 0);
+        (0u32..).zip(new.iter_mut().filter(|n| **n == 0)).for_each(|(next, n)| *n = next);
+        let mut keep = new.iter().map(|&n| n != u32::MAX);
+        self.vertices.retain(|_| keep.next() == Some(true));
+        self.triangles.iter_mut().for_each(|t| *t = t.map(|a| new[a as usize]));
+    }
+
+    /// The skin of `mesh` itself.
+    pub fn of(mesh: &TetMesh) -> FineSkin {
+        let triangles = mesh.face_set(SKIN).map_or(Vec::new(), |s| s.triangles.clone());
+        let mut skin = FineSkin { vertices: mesh.nodes.clone(), triangles };
+        skin.drop_unused();
+        skin
+    }
+
+    /// Each triangle cut in four at the middles of its edges.
+    pub fn subdivided(&self) -> FineSkin {
+        let mut vertices = self.vertices.clone();
+        let mut middle: std::collections::HashMap<(u32, u32), u32> = Default::default();
+        let mut half = |a: u32, b: u32| {
+            *middle.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                vertices.push(0.5 * (self.vertices[a as usize] + self.vertices[b as usize]));
+                vertices.len() as u32 - 1
+            })
+        };
+        let cut = |&[a, b, c]: &[u32; 3]| {
+            let [p, q, r] = [half(a, b), half(b, c), half(c, a)];
+            [[a, p, r], [b, q, p], [c, r, q], [p, q, r]]
+        };
+        let triangles = self.triangles.iter().flat_map(cut).collect();
+        FineSkin { vertices, triangles }
+    }
+
+    fn check(&self) -> Result<(), MeshError> {
+        let n_nodes = self.vertices.len();
+        if self.triangles.is_empty() {
+            return Err(MeshError::Inconsistent { what: "triangles of the fine skin".into(), found: 0, wanted: 1 });
+        }
+        if let Some((node, x)) = self.vertices.iter().enumerate().find(|(_, x)| !x.iter().all(|c| c.is_finite())) {
+            return Err(MeshError::NotFinite { node, x: x.x, y: x.y, z: x.z });
+        }
+        match self.triangles.as_flattened().iter().find(|&&a| a as usize >= n_nodes) {
+            Some(&node) => Err(MeshError::NodeOutOfRange { what: "the fine skin".into(), node, n_nodes }),
+            None => Ok(()),
+        }
+    }
+}
+
 impl TetMesh {
     /// Returns the mesh itself if it can be simulated: indices in range, finite positions, positive rest volumes,
     /// unique set names, lists of equal length.
@@ -149,6 +212,9 @@ impl TetMesh {
         }
         for set in &self.face_sets {
             in_range(&|| format!("face set `{}`", set.name), set.triangles.as_flattened())?;
+        }
+        if let Some(skin) = &self.fine_skin {
+            skin.check()?;
         }
         unique("node", self.node_sets.iter().map(|s| &s.name))?;
         unique("face", self.face_sets.iter().map(|s| &s.name))?;

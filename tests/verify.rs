@@ -5,6 +5,8 @@
 mod common;
 #[path = "verify/derivatives.rs"]
 mod derivatives;
+#[path = "verify/embedding.rs"]
+mod embedding;
 #[path = "verify/golden.rs"]
 mod golden;
 #[path = "verify/head.rs"]
@@ -15,12 +17,16 @@ mod invariants;
 mod loads;
 #[path = "verify/locking.rs"]
 mod locking;
+#[path = "verify/mms.rs"]
+mod mms;
 #[path = "verify/patch.rs"]
 mod patch;
 #[path = "verify/rigid.rs"]
 mod rigid;
 #[path = "verify/scenes.rs"]
 mod scenes;
+#[path = "verify/sphere.rs"]
+mod sphere;
 #[path = "verify/time.rs"]
 mod time;
 #[path = "verify/tissue.rs"]

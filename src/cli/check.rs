@@ -24,6 +24,9 @@ impl Check {
         for set in &mesh.face_sets {
             say!("  faces {}: {} triangles", set.name, set.triangles.len());
         }
+        if let Some(skin) = model.skin().embedding() {
+            say!("  fine skin: {} vertices, at most {:.2e} m outside the mesh", skin.len(), skin.farthest);
+        }
         for bone in &model.parts().bones {
             say!("  bone {}: {} nodes, {}", bone.name, bone.nodes.len(), bone.drive);
         }

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use cutis::io::{Data, write_bytes, write_pvd, write_vtu};
 use cutis::math::Vec3;
-use cutis::mesh::TetMesh;
+use cutis::mesh::{FaceSet, SKIN, TetMesh};
 use cutis::port::{Causality, Port, Type};
-use cutis::sim::Sim;
+use cutis::sim::{Model, Sim};
 use cutis::view::{Camera, Image, Rgb, Surface, draw, heat};
 
 /// Columns of the table: time and every varying port but the skin's, elements counted from 1.
@@ -96,6 +96,21 @@ impl Series {
         write_pvd(&path, &self.frames)?;
         Ok(path)
     }
+}
+
+/// What a picture shows of a model at these positions: its mesh, a fine skin in place of the mesh's own.
+pub fn shown<const N: usize>(model: &Model, x: [&[Vec3]; N]) -> (TetMesh, [Vec<Vec3>; N]) {
+    let mut mesh = model.mesh().clone();
+    let mut x = x.map(<[Vec3]>::to_vec);
+    if let Some(fine) = mesh.fine_skin.take() {
+        let first = mesh.nodes.len() as u32;
+        mesh.nodes.extend(model.skin().all(&model.mesh().nodes));
+        x.iter_mut().for_each(|x| x.extend(model.skin().all(x)));
+        let triangles = fine.triangles.iter().map(|t| t.map(|a| first + a)).collect();
+        mesh.face_sets.retain(|set| set.name != SKIN);
+        mesh.face_sets.push(FaceSet { name: SKIN.into(), triangles });
+    }
+    (mesh, x)
 }
 
 const PANEL: (usize, usize) = (430, 560);

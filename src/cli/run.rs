@@ -7,7 +7,7 @@ use std::time::Instant;
 use cutis::load;
 use cutis::sim::Sim;
 
-use super::output::{Series, Table, picture};
+use super::output::{Series, Table, picture, shown};
 use super::progress;
 
 #[derive(clap::Args)]
@@ -78,7 +78,8 @@ impl Run {
         say!("wrote {}", self.out.join("ports.csv").display());
         if !self.table_only {
             say!("wrote {}", series.save()?.display());
-            let image = picture(model.mesh(), &[("start", &start), ("end", sim.positions())]);
+            let (mesh, [start, end]) = shown(&model, [&start, sim.positions()]);
+            let image = picture(&mesh, &[("start", &start), ("end", &end)]);
             cutis::io::write_bytes(&self.out.join("picture.png"), &image.to_png())?;
             say!("wrote {}", self.out.join("picture.png").display());
         }

@@ -9,7 +9,7 @@
 //!
 //! Source: Martin, Thomaszewski, Grinspun & Gross, "Example-based elastic materials", ACM TOG 30(4), 2011, section 4.
 
-use crate::fem::{At, Curvature, HessianSink, Term};
+use crate::fem::{At, Curvature, EDGES, HessianSink, Term, tet10_points};
 use crate::math::{Mat3, Vec3};
 use crate::mesh::TetMesh;
 
@@ -24,12 +24,24 @@ const MIDSIDE: f64 = 4.0 / 27.0;
 pub fn lumped_masses(mesh: &TetMesh, midsides: &[[u32; 6]], density: &[f64]) -> Vec<f64> {
     let mut m = vec![0.0; mesh.nodes.len()];
     for (e, tet) in mesh.tets.iter().enumerate() {
-        let mass = density[mesh.region[e] as usize] * mesh.volume(e);
+        let mass = density[mesh.region[e] as usize] * midsides.get(e).map_or(mesh.volume(e), |m| volume(mesh, e, m));
         let corner = if midsides.is_empty() { 0.25 } else { CORNER };
         tet.iter().for_each(|&a| m[a as usize] += corner * mass);
         midsides.get(e).into_iter().flatten().for_each(|&a| m[a as usize] += MIDSIDE * mass);
     }
     m
+}
+
+/// Volume of a quadratic tetrahedron, whose edges may be curved.
+fn volume(mesh: &TetMesh, e: usize, midsides: &[u32; 6]) -> f64 {
+    let X = |a: u32| mesh.nodes[a as usize];
+    let tet = &mesh.tets[e];
+    let straight = |(&m, [i, j]): (&u32, [usize; 2])| X(m) == 0.5 * (X(tet[i]) + X(tet[j]));
+    if midsides.iter().zip(EDGES).all(straight) {
+        return mesh.volume(e);
+    }
+    let nodes = std::array::from_fn(|k| X(if k < 4 { tet[k] } else { midsides[k - 4] }));
+    tet10_points(&nodes).iter().map(|p| p.w).sum()
 }
 
 /// Inertia of lumped nodal masses, kg.

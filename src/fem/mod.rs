@@ -3,8 +3,11 @@
 #![allow(non_snake_case)]
 
 mod assemble;
+mod curved;
 mod difference;
 mod dofs;
+mod embedding;
+mod locate;
 mod matrix;
 mod quadratic;
 mod solid;
@@ -13,8 +16,11 @@ mod tet10;
 mod tet4;
 
 pub use assemble::Assembly;
+pub use curved::{Curving, curve_midsides};
 pub use difference::{Difference, LARGEST_GROWTH};
 pub use dofs::{Configuration, Dofs, RigidBody, Role};
+pub use embedding::{Detached, Embedding};
+pub use locate::{Found, Locator};
 pub use matrix::{BlockMatrix, CouplingMatrix, Pattern};
 pub use quadratic::{EDGES, add_midsides};
 pub use solid::{Elastic, Material, Point, Solid};

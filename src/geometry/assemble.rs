@@ -96,6 +96,7 @@ pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
         region_names: vec!["tissue".into()],
         nodes: stuffed.nodes,
         tets: stuffed.tets,
+        fine_skin: None,
     };
     Assembled { mesh, slit_nodes, released_nodes }
 }

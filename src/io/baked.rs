@@ -41,6 +41,12 @@ pub fn encode(mesh: &TetMesh) -> Vec<u8> {
             put_u32(out, set.triangles.as_flattened());
         });
     }
+    if let Some(skin) = &mesh.fine_skin {
+        section(&mut payload, b"SKNV", |out| {
+            skin.vertices.iter().flat_map(|x| x.iter()).for_each(|c| out.extend(c.to_le_bytes()));
+        });
+        section(&mut payload, b"SKNT", |out| put_u32(out, skin.triangles.as_flattened()));
+    }
     let mut out = Vec::with_capacity(HEADER + payload.len());
     out.extend(MAGIC);
     out.extend(VERSION.to_le_bytes());
@@ -110,11 +116,7 @@ fn sections(payload: &[u8], path: &Path) -> Result<TetMesh, IoError> {
         let length = cursor.u64()?;
         let mut content = Cursor { bytes: cursor.take(usize::try_from(length).unwrap_or(usize::MAX))?, path };
         match tag {
-            b"NODE" => {
-                let (rows, _) = content.rows::<24>("NODE")?.as_chunks::<8>();
-                let values: Vec<f64> = rows.iter().map(|b| f64::from_le_bytes(*b)).collect();
-                mesh.nodes = values.chunks_exact(3).map(Vec3::from_column_slice).collect();
-            }
+            b"NODE" => mesh.nodes = content.places("NODE")?,
             b"TETS" => mesh.tets = content.rows::<16>("TETS")?.chunks_exact(16).map(numbers).collect(),
             b"REGN" => mesh.region = content.rows::<4>("REGN")?.chunks_exact(4).map(|b| numbers::<1>(b)[0]).collect(),
             b"RNAM" => {
@@ -131,6 +133,11 @@ fn sections(payload: &[u8], path: &Path) -> Result<TetMesh, IoError> {
                 let name = content.name()?;
                 let triangles = content.rows::<12>("FSET")?.chunks_exact(12).map(numbers).collect();
                 mesh.face_sets.push(FaceSet { name, triangles });
+            }
+            b"SKNV" => mesh.fine_skin.get_or_insert_default().vertices = content.places("SKNV")?,
+            b"SKNT" => {
+                let triangles = content.rows::<12>("SKNT")?.chunks_exact(12).map(numbers).collect();
+                mesh.fine_skin.get_or_insert_default().triangles = triangles;
             }
             _ => {}
         }
@@ -172,6 +179,13 @@ impl<'a> Cursor<'a> {
         let length = self.u32()? as usize;
         let bytes = self.take(length)?.to_vec();
         String::from_utf8(bytes).map_err(|_| IoError::format(self.path, "a name", "bytes", "UTF-8 text"))
+    }
+
+    /// Everything left, as points.
+    fn places(&mut self, tag: &str) -> Result<Vec<Vec3>, IoError> {
+        let (rows, _) = self.rows::<24>(tag)?.as_chunks::<8>();
+        let values: Vec<f64> = rows.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        Ok(values.chunks_exact(3).map(Vec3::from_column_slice).collect())
     }
 
     /// Everything left, in rows of `N` bytes.

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::{IoError, baked, gmsh, vtk};
-use crate::mesh::{MeshError, TetMesh};
+use crate::mesh::{FineSkin, MeshError, SKIN, TetMesh};
 
 const CHOICES: &str = ".cutis, .vtu, .vtk and .msh";
+const SURFACE_CHOICES: &str = ".vtu, .vtk and .msh";
 
 /// Reads a tetrahedral mesh with its regions, node sets and face sets. A foreign file without regions is one region
 /// `tissue`; nodes that no tetrahedron uses are left out.
@@ -20,13 +21,40 @@ pub fn read_mesh(path: &Path) -> Result<TetMesh, IoError> {
     let bytes = std::fs::read(path).map_err(IoError::file(path))?;
     let mut mesh = match kind.as_str() {
         "cutis" => return baked::decode(&bytes, path),
-        "vtu" => vtk::read_vtu(&bytes, path)?,
-        "vtk" => vtk::read_legacy(&bytes, path)?,
+        "vtu" | "vtk" => vtk::read(&bytes, path, kind == "vtk")?,
         _ => gmsh::read(&bytes, path)?,
     };
     in_range(&mesh).map_err(|source| IoError::Mesh { path: path.into(), source })?;
     drop_unused(&mut mesh);
     mesh.checked().map_err(|source| IoError::Mesh { path: path.into(), source })
+}
+
+/// Reads a triangle surface: the triangles of a VTK grid, or the physical surface `skin` of a Gmsh file (all of them if
+/// none has that name). Points that no triangle uses are left out.
+///
+/// # Errors
+/// [`IoError`]: unknown extension, unreadable or malformed file, no triangle in it.
+pub fn read_surface(path: &Path) -> Result<FineSkin, IoError> {
+    let kind = extension(path);
+    if !matches!(kind.as_str(), "vtu" | "vtk" | "msh") {
+        return Err(IoError::Extension { path: path.into(), choices: SURFACE_CHOICES });
+    }
+    let bytes = std::fs::read(path).map_err(IoError::file(path))?;
+    let mut skin = if kind == "msh" {
+        let mesh = gmsh::read(&bytes, path)?;
+        let all = || mesh.face_sets.iter().flat_map(|s| s.triangles.iter().copied()).collect();
+        let triangles = mesh.face_set(SKIN).map_or_else(all, |s| s.triangles.clone());
+        FineSkin { vertices: mesh.nodes, triangles }
+    } else {
+        vtk::read_triangles(&bytes, path, kind == "vtk")?
+    };
+    let n = skin.vertices.len();
+    if skin.triangles.is_empty() || skin.triangles.as_flattened().iter().any(|&a| a as usize >= n) {
+        let found = format!("{} triangles on {n} points", skin.triangles.len());
+        return Err(IoError::format(path, "the surface", found, "triangles on points of the file"));
+    }
+    skin.drop_unused();
+    Ok(skin)
 }
 
 /// Writes a mesh so that [`read_mesh`] returns the same bits.

@@ -17,5 +17,5 @@ pub use baked::{decode, encode};
 pub use ct::{read_labels, read_volume};
 pub use error::IoError;
 pub use file::{create_folder, read_bytes, read_text, write_bytes};
-pub use mesh::{read_mesh, write_mesh};
+pub use mesh::{read_mesh, read_surface, write_mesh};
 pub use vtk::{Data, write_pvd, write_vtu};

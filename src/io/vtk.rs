@@ -13,11 +13,24 @@ use std::path::Path;
 
 use super::IoError;
 use crate::math::Vec3;
-use crate::mesh::TetMesh;
+use crate::mesh::{FineSkin, TetMesh};
 
-pub(crate) use legacy::{legacy_text, read_legacy};
-pub(crate) use vtu_read::read_vtu;
+pub(crate) use legacy::legacy_text;
 pub(crate) use vtu_write::vtu_bytes;
+
+/// The tetrahedral mesh in the bytes of a `.vtu` file, or of a legacy `.vtk` one.
+pub(crate) fn read(bytes: &[u8], path: &Path, legacy: bool) -> Result<TetMesh, IoError> {
+    grid(bytes, path, legacy)?.into_mesh(path)
+}
+
+/// Points and triangles in the same.
+pub(crate) fn read_triangles(bytes: &[u8], path: &Path, legacy: bool) -> Result<FineSkin, IoError> {
+    grid(bytes, path, legacy)?.into_triangles(path)
+}
+
+fn grid(bytes: &[u8], path: &Path, legacy: bool) -> Result<grid::Grid, IoError> {
+    if legacy { legacy::read_legacy(bytes, path) } else { vtu_read::read_vtu(bytes, path) }
+}
 
 /// A named field on nodes or tetrahedra: `components` values each, row by row.
 #[derive(Debug, Clone, Copy, PartialEq)]

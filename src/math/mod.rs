@@ -6,11 +6,13 @@ mod pose;
 mod psd;
 mod svd;
 mod tensor;
+mod triangle;
 
 pub use pose::{Pose, best_fit, exp_rotation, log_rotation};
 pub use psd::clamp_eigenvalues;
 pub use svd::{Svd, polar, svd};
 pub use tensor::{cofactor, d2JdF2, outer, skew, vec9};
+pub use triangle::nearest_weights;
 
 /// A point or vector in space, m.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -8,7 +8,7 @@ use super::materials::{Tissue, stand_in};
 use super::place::nearest_point;
 use super::programme::Programme;
 use crate::effect::{Gravity, Inertia, lumped_masses};
-use crate::fem::add_midsides;
+use crate::fem::{Curving, Embedding, add_midsides, curve_midsides};
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::Slot;
 use crate::sim::{self, Drive, Layout, Marker, Model, ModelParts, Scheme};
@@ -56,6 +56,7 @@ impl Builder<'_> {
         let SceneFile {
             name,
             mesh: mesh_spec,
+            skin,
             tissue: _,
             bone,
             muscle,
@@ -78,6 +79,35 @@ impl Builder<'_> {
                 let at = order.map_or(0, |o| o.span().start);
                 return Err(self.text.at(at, format!("`order` of [mesh] is {found}; wanted 1 or 2")));
             }
+        };
+        if let Some(curved) = mesh_spec.get_ref().curved.as_ref().filter(|c| *c.get_ref()) {
+            if midsides.is_empty() {
+                let message = "`curved` of [mesh] bends the edges of quadratic elements: it wants order = 2".to_owned();
+                return Err(self.text.at(curved.span().start, message));
+            }
+            let Curving { curved, straightened } = curve_midsides(&mut mesh, &midsides);
+            if straightened > 0 {
+                let all = curved + straightened;
+                warnings
+                    .push(format!("{straightened} of {all} curved edges were left straight: an element would fold"));
+            }
+        }
+        let embedding = match &mesh.fine_skin {
+            Some(fine) => {
+                let at = skin.as_ref().map_or(mesh_spec.span(), |s| s.span()).start;
+                let made = Embedding::new(&mesh, &midsides, fine).map_err(|e| self.text.at(at, e.to_string()))?;
+                if made.n_far > 0 {
+                    warnings.push(format!(
+                        "{} of {} vertices of the fine skin lie more than a quarter of an element outside the mesh, \
+                         {:.2e} m at most: they move along with the nearest element",
+                        made.n_far,
+                        made.len(),
+                        made.farthest
+                    ));
+                }
+                Some(made)
+            }
+            None => None,
         };
         let Tissue { mut terms, density, n_history } = self.tissue(file, &mesh, &midsides, &mut warnings)?;
         let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
@@ -136,12 +166,15 @@ impl Builder<'_> {
             }
             None => None,
         };
-        let triangles = mesh.face_set(SKIN).map_or(&[][..], |s| &s.triangles);
+        let skin = match &mesh.fine_skin {
+            Some(fine) => (&fine.vertices[..], &fine.triangles[..]),
+            None => (&mesh.nodes[..], mesh.face_set(SKIN).map_or(&[][..], |s| &s.triangles)),
+        };
         self.text.names("marker", marker.iter().map(|m| &m.name))?;
         let mut markers = Vec::new();
         for m in marker {
             let at = self.text.vector("marker", "at", &m.at)?;
-            let (nodes, weights) = nearest_point(&mesh, triangles, &at).ok_or_else(|| self.text.no_skin(&m.name))?;
+            let (nodes, weights) = nearest_point(skin.0, skin.1, &at).ok_or_else(|| self.text.no_skin(&m.name))?;
             markers.push(Marker { name: m.name.get_ref().clone(), nodes, weights });
         }
         let spec = solver.as_ref();
@@ -166,6 +199,7 @@ impl Builder<'_> {
             name: name.clone().unwrap_or_else(|| "scene".into()),
             mesh,
             midsides,
+            embedding,
             bones,
             muscles,
             loads,
@@ -221,12 +255,13 @@ impl Builder<'_> {
     }
 }
 
-/// The scene without its `[mesh...]` tables: what identifies a model beside its mesh.
+/// The scene without its `[mesh...]` and `[skin]` tables: what identifies a model beside its mesh.
 fn without_mesh_table(text: &str) -> String {
     let mut inside = false;
     let keep = |line: &&str| {
         if line.trim_start().starts_with('[') {
-            inside = line.trim_start().trim_start_matches('[').trim_start().starts_with("mesh");
+            let name = line.trim_start().trim_start_matches('[').trim_start();
+            inside = name.starts_with("mesh") || name.starts_with("skin");
         }
         !inside
     };

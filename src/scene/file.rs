@@ -15,6 +15,7 @@ pub type Triple = Spanned<[f64; 3]>;
 pub struct SceneFile {
     pub name: Option<String>,
     pub mesh: Spanned<MeshSpec>,
+    pub skin: Option<Spanned<SkinSpec>>,
     pub tissue: Vec<TissueSpec>,
     #[serde(default)]
     pub bone: Vec<BoneSpec>,
@@ -42,6 +43,7 @@ pub struct MeshSpec {
     pub head: Option<HeadSpec>,
     pub block: Option<BlockSpec>,
     pub order: Option<Spanned<u32>>,
+    pub curved: Option<Spanned<bool>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -59,6 +61,14 @@ pub struct BlockSpec {
     pub pattern: Option<Spanned<String>>,
     #[serde(default)]
     pub layers: Vec<(String, f64)>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SkinSpec {
+    pub file: Option<String>,
+    pub edge: Option<Spanned<f64>>,
+    pub subdivisions: Option<Spanned<u32>>,
 }
 
 #[derive(Debug, Clone, Default, Deserialize)]

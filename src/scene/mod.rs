@@ -26,7 +26,7 @@ pub use keys::{KEYS, Key, Range, key_reference, tables};
 pub use presets::{Preset, preset_reference, presets};
 pub use programme::{Programme, Setting};
 pub use rest_shape::RestShapeError;
-pub use source::MeshSource;
+pub use source::{MeshSource, SkinSource};
 
 /// Why a scene was refused; line and column are 1-based.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

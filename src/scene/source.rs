@@ -2,7 +2,8 @@
 
 use super::SceneError;
 use super::check::Text;
-use super::file::{MeshSpec, SceneFile};
+use super::file::{MeshSpec, SceneFile, SkinSpec};
+use super::keys::find;
 use crate::math::Vec3;
 
 /// What the `[mesh]` table asks for.
@@ -30,10 +31,59 @@ pub enum MeshSource {
     },
 }
 
+/// What the `[skin]` table asks for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SkinSource {
+    /// A surface file, relative to the scene.
+    File(String),
+    /// The skin of the synthetic head at this edge, m.
+    Head {
+        /// Edge, m.
+        edge: f64,
+    },
+    /// The mesh's own skin, cut this many times.
+    Subdivided(u32),
+}
+
 impl SceneFile {
+    /// Where a fine skin comes from, if the scene has one.
+    ///
+    /// # Errors
+    /// [`SceneError::Meaning`] for none or several sources, or values out of range.
+    pub fn skin_source(&self, text: &str) -> Result<Option<SkinSource>, SceneError> {
+        let text = Text(text);
+        let Some(skin) = &self.skin else { return Ok(None) };
+        Ok(Some(match skin.get_ref() {
+            SkinSpec { file: Some(file), edge: None, subdivisions: None } => SkinSource::File(file.clone()),
+            SkinSpec { file: None, edge: Some(edge), subdivisions: None } => {
+                if self.mesh.get_ref().head.is_none() {
+                    let message = "`edge` of [skin] is for the synthetic head: it wants [mesh.head]".to_owned();
+                    return Err(text.at(edge.span().start, message));
+                }
+                SkinSource::Head { edge: text.checked("skin", "edge", edge)? }
+            }
+            SkinSpec { file: None, edge: None, subdivisions: Some(times) } => {
+                let n = *times.get_ref();
+                if !find("skin", "subdivisions").range.holds(f64::from(n)) {
+                    return Err(text.out_of_range("skin", "subdivisions", times, &n));
+                }
+                SkinSource::Subdivided(n)
+            }
+            _ => {
+                let message = "[skin] needs exactly one of `file`, `edge`, `subdivisions`".to_owned();
+                return Err(text.at(skin.span().start, message));
+            }
+        }))
+    }
+
     /// Order of the elements, if the scene names one.
     pub fn order(&self) -> Option<u32> {
         self.mesh.get_ref().order.as_ref().map(|o| *o.get_ref())
+    }
+
+    /// Whether surface edges of quadratic elements are bent.
+    pub fn curved(&self) -> bool {
+        self.mesh.get_ref().curved.as_ref().is_some_and(|c| *c.get_ref())
     }
 
     /// Where the mesh comes from.

@@ -30,9 +30,9 @@ impl Sim {
         let rest = &self.model.mesh().nodes;
         match p.slot {
             Slot::Time => out.fill(self.state.t),
-            Slot::SkinPosition => gather(self.model.skin(), &self.state.config.x, offset, out),
-            Slot::SkinVelocity => gather(self.model.skin(), &self.state.motion.v, offset, out),
-            Slot::SkinRestPosition => gather(self.model.skin(), rest, offset, out),
+            Slot::SkinPosition => self.model.skin().gather(&self.state.config.x, offset, out),
+            Slot::SkinVelocity => self.model.skin().gather(&self.state.motion.v, offset, out),
+            Slot::SkinRestPosition => self.model.skin().gather(rest, offset, out),
             Slot::MarkerPosition => rows(|k| self.marker(k), offset, out),
             Slot::BoneReactionForce => rows(|k| o.reaction_force[k], offset, out),
             Slot::BoneReactionTorque => rows(|k| o.reaction_torque[k], offset, out),
@@ -83,7 +83,7 @@ impl Sim {
 
     fn marker(&self, k: usize) -> Vec3 {
         let marker = &self.model.parts().markers[k];
-        marker.nodes.iter().zip(marker.weights).map(|(&a, w)| w * self.state.config.x[a as usize]).sum()
+        self.model.skin().within(marker.nodes, marker.weights, &self.state.config.x)
     }
 }
 
@@ -96,15 +96,5 @@ fn check_range(port: &Port, offset: usize, n: usize) -> Result<(), SimError> {
 fn rows(row: impl Fn(usize) -> Vec3, offset: usize, out: &mut [f64]) {
     for (k, value) in out.iter_mut().enumerate() {
         *value = row((offset + k) / 3)[(offset + k) % 3];
-    }
-}
-
-/// The same for node positions, a whole row at a time where `out` is aligned with them.
-fn gather(nodes: &[u32], x: &[Vec3], offset: usize, out: &mut [f64]) {
-    if !(offset.is_multiple_of(3) && out.len().is_multiple_of(3)) {
-        return rows(|k| x[nodes[k] as usize], offset, out);
-    }
-    for (row, &a) in out.chunks_exact_mut(3).zip(&nodes[offset / 3..]) {
-        row.copy_from_slice(x[a as usize].as_slice());
     }
 }

@@ -9,6 +9,7 @@ mod pace;
 mod ports;
 mod recover;
 mod scheme;
+mod skin;
 mod start;
 mod state;
 mod step;
@@ -16,6 +17,7 @@ mod step;
 pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
 pub use ports::Layout;
 pub use scheme::Scheme;
+pub use skin::Skin;
 pub use state::{State, StateError};
 pub use step::StepReport;
 

@@ -4,9 +4,10 @@ use sha2::{Digest, Sha256};
 
 use super::ports::{Layout, table};
 use super::scheme::Scheme;
-use crate::fem::{Dofs, Term};
+use super::skin::Skin;
+use crate::fem::{Dofs, Embedding, Term};
 use crate::math::{Mat3, Vec3, svd};
-use crate::mesh::{SKIN, TetMesh};
+use crate::mesh::TetMesh;
 use crate::port::Port;
 use crate::solve::{Rung, Strategy};
 
@@ -45,12 +46,12 @@ pub struct Bone {
     pub drive: Drive,
 }
 
-/// A point that rides on a skin triangle.
+/// A point that rides on a triangle of the skin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marker {
     /// Name, unique among the markers.
     pub name: String,
-    /// Nodes of the triangle.
+    /// Corners of the triangle: nodes of the mesh, or vertices of the fine skin where there is one.
     pub nodes: [u32; 3],
     /// Barycentric weights.
     pub weights: [f64; 3],
@@ -82,6 +83,8 @@ pub struct ModelParts {
     pub mesh: TetMesh,
     /// Mid-edge nodes of each tetrahedron; empty for linear elements.
     pub midsides: Vec<[u32; 6]>,
+    /// How the mesh's fine skin rides on it, if it has one.
+    pub embedding: Option<Embedding>,
     /// Bones, in the order of the ports' rows; no node belongs to two.
     pub bones: Vec<Bone>,
     /// Names of the muscles, in order.
@@ -141,8 +144,7 @@ pub struct Model {
     parts: ModelParts,
     ports: Vec<Port>,
     dofs: Dofs,
-    skin: Vec<u32>,
-    triangles: Vec<i32>,
+    skin: Skin,
     osteotomy: Vec<(u32, u32)>,
     token: String,
 }
@@ -162,11 +164,8 @@ impl Model {
         if parts.inertia.is_none() {
             check_held(&parts, &dofs)?;
         }
-        let skin = parts.mesh.skin_nodes();
-        let row = |a: &u32| skin.binary_search(a).expect("skin nodes come from the triangles") as i32;
-        let triangles: Vec<i32> =
-            parts.mesh.face_set(SKIN).map_or(Vec::new(), |s| s.triangles.as_flattened().iter().map(row).collect());
-        let ports = table(&parts, skin.len(), triangles.len() / 3);
+        let skin = Skin::new(&parts.mesh, parts.embedding.take());
+        let ports = table(&parts, skin.len(), skin.triangles().len() / 3);
         let osteotomy = osteotomy_edges(&parts.mesh, &parts.bones);
         if !osteotomy.is_empty() {
             parts.warnings.push(format!(
@@ -176,7 +175,7 @@ impl Model {
             ));
         }
         let token = token(&parts, &ports);
-        Ok(Model { parts, ports, dofs, skin, triangles, osteotomy, token })
+        Ok(Model { parts, ports, dofs, skin, osteotomy, token })
     }
 
     /// The same without one rung of recovery, to measure what it buys.
@@ -209,13 +208,13 @@ impl Model {
     pub(super) fn is_quadratic(&self) -> bool {
         self.dofs.bodies.is_empty() && self.parts.terms.iter().all(|t| t.is_quadratic())
     }
-    /// Mesh nodes of the skin, in the order of `skin.position`.
-    pub fn skin(&self) -> &[u32] {
+    /// What a host reads of the surface.
+    pub fn skin(&self) -> &Skin {
         &self.skin
     }
     /// Skin triangles as rows of `skin.position`, flattened.
     pub fn skin_triangles(&self) -> &[i32] {
-        &self.triangles
+        self.skin.triangles()
     }
     /// Edges between nodes of two bones.
     pub(super) fn osteotomy(&self) -> &[(u32, u32)] {
@@ -326,6 +325,10 @@ fn token(parts: &ModelParts, ports: &[Port]) -> String {
     mesh.tets.as_flattened().iter().chain(&mesh.region).for_each(|i| hash.update(i.to_le_bytes()));
     for bone in &parts.bones {
         bone.nodes.iter().for_each(|a| hash.update(a.to_le_bytes()));
+    }
+    if let Some(skin) = &mesh.fine_skin {
+        skin.vertices.iter().flat_map(|x| x.iter()).for_each(|c| hash.update(c.to_le_bytes()));
+        skin.triangles.as_flattened().iter().for_each(|i| hash.update(i.to_le_bytes()));
     }
     let digest = hash.finalize();
     let hex: String = digest.iter().take(16).map(|b| format!("{b:02x}")).collect();

@@ -43,7 +43,13 @@ fn the_counter_counts() {
 
 #[test]
 fn set_and_get_allocate_nothing() {
-    let model = Arc::new(cutis::load::embedded().unwrap().model);
+    let fine_skin = super::util::root().join("tests/scenes/skin.toml");
+    copies_freely(cutis::load::embedded().unwrap().model);
+    copies_freely(cutis::load::from_file(&fine_skin).unwrap().model);
+}
+
+fn copies_freely(model: cutis::sim::Model) {
+    let model = Arc::new(model);
     let mut sim = Sim::new(model.clone()).unwrap();
     sim.initialise().unwrap();
     for (k, port) in model.ports().iter().enumerate().filter(|(_, p)| p.ty == Type::Float64 && !p.is_empty()) {

@@ -2,9 +2,9 @@
 use std::path::{Path, PathBuf};
 
 use cutis::geometry::{Block, Pattern, block};
-use cutis::io::{Data, IoError, decode, encode, read_mesh, write_mesh, write_pvd, write_vtu};
+use cutis::io::{Data, IoError, decode, encode, read_mesh, read_surface, write_mesh, write_pvd, write_vtu};
 use cutis::math::Vec3;
-use cutis::mesh::{FaceSet, NodeSet, TetMesh};
+use cutis::mesh::{FaceSet, FineSkin, NodeSet, TetMesh};
 
 pub fn scratch(name: &str) -> PathBuf {
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("geometry");
@@ -115,6 +115,32 @@ fn foreign_files_are_read() {
     let mesh = read_mesh(&path).unwrap();
     assert_eq!((mesh.tets.len(), mesh.region_names[0].as_str()), (1, "region_8"));
     assert!(mesh.face_sets.is_empty());
+}
+
+#[test]
+fn surfaces_are_read_and_baked() {
+    let wanted = FineSkin {
+        vertices: [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5], [1.0, 1.0, 0.0]].map(Vec3::from).to_vec(),
+        triangles: vec![[0, 1, 2], [1, 3, 2]],
+    };
+    // A point that no triangle uses, and a line that is none.
+    let vtk = "# vtk DataFile Version 3.0\nface\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n9 9 9\n0 0 0\n1 0 0\n\
+               0 1 0.5\n1 1 0\nCELLS 3 11\n3 1 2 3\n2 1 2\n3 2 4 3\nCELL_TYPES 3\n5\n3\n5\n";
+    let msh = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 1 \"skin\"\n2 2 \"other\"\n$EndPhysicalNames\n\
+               $Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0.5\n4 1 1 0\n5 3 3 3\n$EndNodes\n$Elements\n3\n1 2 2 1 1 1 2 3\n\
+               2 2 2 1 1 2 4 3\n3 2 2 2 2 1 2 5\n$EndElements\n";
+    for (name, text) in [("surface.vtk", vtk), ("surface.msh", msh)] {
+        let path = scratch(name);
+        std::fs::write(&path, text).unwrap();
+        assert_eq!(read_surface(&path).unwrap(), wanted, "{name}");
+    }
+    let mesh = TetMesh { fine_skin: Some(wanted.clone()), ..sample() };
+    assert_eq!(decode(&encode(&mesh), Path::new("baked")).unwrap(), mesh);
+    let path = scratch("no_surface.vtk");
+    std::fs::write(&path, vtk.replace("\n5\n3\n5\n", "\n3\n3\n3\n").replace("3 1 2 3", "2 1 2")).unwrap();
+    assert!(read_surface(&path).unwrap_err().to_string().contains("triangles"));
+    let torn = TetMesh { fine_skin: Some(FineSkin { triangles: vec![[0, 1, 9]], ..wanted }), ..sample() };
+    assert!(torn.checked().is_err());
 }
 
 fn base64(bytes: &[u8]) -> String {

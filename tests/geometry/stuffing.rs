@@ -25,6 +25,7 @@ fn mesh_of(stuffing: &Stuffing, walls: &[Wall]) -> TetMesh {
         region_names: vec!["tissue".into()],
         node_sets: vec![],
         face_sets: walls.iter().enumerate().map(|(w, wall)| set(w, wall.name)).collect(),
+        ..TetMesh::default()
     }
     .checked()
     .unwrap()

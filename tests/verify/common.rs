@@ -56,6 +56,18 @@ pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().map(f64::abs).fold(0.0, f64::max)
 }
 
+/// Marks the lines of `[mesh]` of a kind of element whose tissue averages pressure at the nodes.
+pub const NODAL: &str = "# nodal pressure\n";
+
+/// `scene` with averaged pressure, if its `[mesh]` is so marked.
+pub fn with_pressure(scene: &str) -> String {
+    if scene.contains(NODAL) {
+        scene.replace("[[tissue]]\n", "[[tissue]]\npressure = \"nodal\"\n")
+    } else {
+        scene.into()
+    }
+}
+
 /// Constants of a law at a stiffness of about `E` Pa and a Poisson's ratio of 0.4, in the law's order.
 pub fn constants(law: &Law, E: f64) -> Vec<Vec<f64>> {
     let mu = E / 2.8;

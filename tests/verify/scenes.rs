@@ -31,6 +31,7 @@ fn slips_are_answered_with_line_column_and_choices() {
         ("[[bone]]", "[[bone]]\nname = \"a\"\nnodes = \"x_min\"\n[[bone]]", vec!["claim node"]),
         ("cells = [4, 2, 2]", "cells = [4, 0, 2]", vec!["line 3", ">= 1"]),
         ("[mesh.block]", "[mesh]\nfile = \"a.msh\"\n[mesh.block]", vec!["exactly one"]),
+        ("[mesh.block]", "[mesh]\ncurved = true\n[mesh.block]", vec!["line 2, column 10", "order = 2"]),
         ("[[tissue]]", "[[tissue]]\nregions = [\"fat\"]", vec!["unknown region `fat`", "tissue"]),
         (
             "[[bone]]",
@@ -48,6 +49,18 @@ fn slips_are_answered_with_line_column_and_choices() {
         for part in wanted {
             assert!(message.contains(part), "`{part}` is missing from:\n{message}");
         }
+    }
+}
+
+/// What a component is made of is the scene itself: mesh, elements, everything that the token hashes.
+#[test]
+fn a_packed_scene_is_the_scene() {
+    for name in ["curved", "order_2", "layers", "skin"] {
+        let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/").to_owned() + name + ".toml";
+        let scene = std::path::Path::new(&scene);
+        let plain = cutis::load::from_file(scene).expect("a scene").model;
+        let packed = cutis::load::baked(scene).and_then(|b| b.load()).expect("a packed scene").model;
+        assert_eq!(packed.token(), plain.token(), "{name}");
     }
 }
 

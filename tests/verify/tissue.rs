@@ -118,9 +118,8 @@ fn fibres_are_slack_below_the_crimp_and_objective() {
 }
 
 fn displacement(sim: &Sim) -> Vec<Vec3> {
-    let X = &sim.model().mesh().nodes;
-    let x = rows(&get(sim, "skin.position"));
-    sim.model().skin().iter().zip(x).map(|(&a, x)| x - X[a as usize]).collect()
+    let (X, x) = (rows(&get(sim, "skin.restPosition")), rows(&get(sim, "skin.position")));
+    X.iter().zip(x).map(|(X, x)| x - X).collect()
 }
 
 fn furthest(sim: &Sim) -> f64 {

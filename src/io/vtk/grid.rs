@@ -5,10 +5,12 @@ use std::path::Path;
 
 use crate::io::IoError;
 use crate::math::Vec3;
-use crate::mesh::{FaceSet, NodeSet, TetMesh};
+use crate::mesh::{FaceSet, FineSkin, NodeSet, TetMesh};
 
 /// VTK's number for a linear tetrahedron.
 pub(super) const VTK_TETRA: i64 = 10;
+/// And for a triangle.
+const VTK_TRIANGLE: i64 = 5;
 const REGION: &str = "region";
 const REGION_NAMES: &str = "region_names";
 const NODE_SET: &str = "set:";
@@ -78,6 +80,26 @@ pub(super) fn tags(mesh: &TetMesh) -> [Vec<Array>; 3] {
 }
 
 impl Grid {
+    /// The triangles of the grid; other cells are passed over.
+    pub fn into_triangles(self, path: &Path) -> Result<FineSkin, IoError> {
+        let mut triangles = Vec::new();
+        let mut begin = 0;
+        for (cell, (&kind, &end)) in self.types.iter().zip(&self.offsets).enumerate() {
+            let slip = || {
+                let found = format!("offset {end}");
+                IoError::format(path, format!("cell {cell}"), found, "offsets that grow, and corners in range")
+            };
+            let end = usize::try_from(end).map_err(|_| slip())?;
+            let corners = self.connectivity.get(begin..end).ok_or_else(slip)?;
+            begin = end;
+            if kind == VTK_TRIANGLE {
+                let corners: Result<Vec<u32>, _> = corners.iter().map(|&a| u32::try_from(a)).collect();
+                triangles.push(corners.ok().and_then(|c| c.try_into().ok()).ok_or_else(slip)?);
+            }
+        }
+        Ok(FineSkin { vertices: self.points, triangles })
+    }
+
     /// The tetrahedra and tags of the grid; cells of lower dimension are passed over.
     pub fn into_mesh(self, path: &Path) -> Result<TetMesh, IoError> {
         let mut mesh = TetMesh { nodes: self.points, ..TetMesh::default() };

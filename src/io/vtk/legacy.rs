@@ -84,8 +84,8 @@ fn unpercent(word: &str) -> String {
     String::from_utf8_lossy(&out).into_owned()
 }
 
-/// The mesh in the bytes of a legacy `.vtk` file.
-pub(crate) fn read_legacy(bytes: &[u8], path: &Path) -> Result<TetMesh, IoError> {
+/// The grid in the bytes of a legacy `.vtk` file.
+pub(super) fn read_legacy(bytes: &[u8], path: &Path) -> Result<Grid, IoError> {
     let text = String::from_utf8_lossy(bytes);
     let mut words = Words::new(path, &text);
     let first = words.line().unwrap_or("");
@@ -164,7 +164,7 @@ pub(crate) fn read_legacy(bytes: &[u8], path: &Path) -> Result<TetMesh, IoError>
             _ => return Err(words.slip(&format!("`{word}`"), "a section of an unstructured grid")),
         }
     }
-    grid.into_mesh(path)
+    Ok(grid)
 }
 
 fn store(grid: &mut Grid, into: Option<bool>, array: Array) {

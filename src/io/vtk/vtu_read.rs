@@ -11,15 +11,14 @@ use super::base64;
 use super::grid::{Array, Grid, Values, text};
 use crate::io::IoError;
 use crate::math::Vec3;
-use crate::mesh::TetMesh;
 
 /// Deflate's best compression ratio: what bounds a decompressed size from the file's own.
 const MOST_INFLATION: usize = 1032;
 
 type Attributes = BTreeMap<String, String>;
 
-/// The mesh in the bytes of a `.vtu` file.
-pub(crate) fn read_vtu(bytes: &[u8], path: &Path) -> Result<TetMesh, IoError> {
+/// The grid in the bytes of a `.vtu` file.
+pub(super) fn read_vtu(bytes: &[u8], path: &Path) -> Result<Grid, IoError> {
     if !bytes.trim_ascii_end().ends_with(b"</VTKFile>") {
         let place = format!("byte {}", bytes.len());
         return Err(IoError::format(path, place, "the end of the file", "</VTKFile>: not a .vtu file, or cut short"));
@@ -85,7 +84,7 @@ pub(crate) fn read_vtu(bytes: &[u8], path: &Path) -> Result<TetMesh, IoError> {
         let array = file.array(&with, None)?;
         place_array(&mut grid, &group, array, path)?;
     }
-    grid.into_mesh(path)
+    Ok(grid)
 }
 
 fn open_appended(grid: &mut Grid, group: &str, with: Attributes) {
