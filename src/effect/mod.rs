@@ -7,6 +7,7 @@ mod inertia;
 mod load;
 mod muscle;
 mod pressure;
+mod springs;
 mod tissue;
 mod viscous;
 
@@ -15,6 +16,7 @@ pub use inertia::{Inertia, lumped_masses};
 pub use load::DeadLoad;
 pub use muscle::{Muscle, nearest_on_path};
 pub use pressure::Pressure;
+pub use springs::{Spring, Springs, springs};
 pub use tissue::{Branches, Elements, LAWS, Law, law};
 pub use viscous::{Measure, Viscous};
 

@@ -122,7 +122,7 @@ pub const KEYS: &[Key] = &[
     key("skin", "edge", "float", "m", From(0.002, 0.012), "none", "The synthetic head's skin at this edge of the lattice cell."),
     key("skin", "subdivisions", "integer", "", From(1.0, 6.0), "none", "The mesh's own skin with each triangle cut in four this many times."),
     key("tissue", "regions", "array of strings", "", Any, "all regions", "Regions of the mesh made of this material."),
-    key("tissue", "energy", "string", "", OneOf(&["linear", "corotational", "st-venant-kirchhoff", "stable-neo-hookean", "neo-hookean", "mooney-rivlin", "yeoh", "fung", "veronda-westmann", "ogden"]), "\"stable-neo-hookean\"", "Strain energy density; it decides which constants below are wanted (see theory.md)."),
+    key("tissue", "energy", "string", "", OneOf(&["linear", "corotational", "st-venant-kirchhoff", "stable-neo-hookean", "neo-hookean", "mooney-rivlin", "yeoh", "fung", "veronda-westmann", "ogden", "mass-spring"]), "\"stable-neo-hookean\"", "Strain energy density; it decides which constants below are wanted (see theory.md). `mass-spring` is for comparison: springs along the edges, of `E` alone, without a Poisson's ratio and without volume."),
     key("tissue", "E", "float", "Pa", Positive, "of the law", "Young's modulus at small strain."),
     key("tissue", "nu", "float", "", From(0.0, NU_LIMIT), "of the law", "Poisson's ratio at small strain."),
     key("tissue", "mu", "float or array", "Pa", Any, "of the law", "Shear modulus (`fung`), or one for each term (`ogden`)."),

@@ -15,6 +15,7 @@ mod materials;
 mod place;
 mod programme;
 mod source;
+mod springs;
 
 pub use build::build;
 pub use file::SceneFile;
