@@ -14,6 +14,7 @@
 )]
 
 pub mod bytes;
+pub mod compare;
 pub mod effect;
 pub mod energy;
 pub mod error;

@@ -3,6 +3,8 @@
 
 #[path = "verify/common.rs"]
 mod common;
+#[path = "verify/compare.rs"]
+mod compare;
 #[path = "verify/derivatives.rs"]
 mod derivatives;
 #[path = "verify/embedding.rs"]

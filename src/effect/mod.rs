@@ -14,6 +14,7 @@ mod nodal_pressure;
 mod pressure;
 mod prestress;
 mod rayleigh;
+mod springs;
 mod tissue;
 mod viscous;
 
@@ -29,6 +30,7 @@ pub use nodal_pressure::{NodalPressure, Volume};
 pub use pressure::Pressure;
 pub use prestress::{Balance, Prestress};
 pub use rayleigh::{damping_memory, stiffness_damping};
+pub use springs::{Spring, Springs, springs};
 pub use tissue::{Branches, Elements, LAWS, Law, law};
 pub use viscous::{Measure, Viscous};
 

@@ -124,7 +124,7 @@ pub const KEYS: &[Key] = &[
     key("tissue", "regions", "array of strings", "", Any, "all regions", "Regions of the mesh made of this material."),
     key("tissue", "preset", "string", "", Any, "none", "A tissue of the table below; keys given beside it take the place of its own, `energy` that of its law."),
     key("tissue", "level", "string", "", OneOf(&["low", "typical", "high"]), "\"typical\"", "End of the published range that the preset's stiffness is taken from."),
-    key("tissue", "energy", "string", "", OneOf(&["linear", "corotational", "st-venant-kirchhoff", "stable-neo-hookean", "neo-hookean", "mooney-rivlin", "yeoh", "fung", "veronda-westmann", "ogden"]), "\"stable-neo-hookean\"", "Strain energy density; it decides which constants below are wanted (see theory.md)."),
+    key("tissue", "energy", "string", "", OneOf(&["linear", "corotational", "st-venant-kirchhoff", "stable-neo-hookean", "neo-hookean", "mooney-rivlin", "yeoh", "fung", "veronda-westmann", "ogden", "mass-spring"]), "\"stable-neo-hookean\"", "Strain energy density; it decides which constants below are wanted (see theory.md). `mass-spring` is for comparison: springs along the edges, of `E` alone, without a Poisson's ratio and without volume."),
     key("tissue", "E", "float", "Pa", Positive, "of the law", "Young's modulus at small strain."),
     key("tissue", "nu", "float", "", From(0.0, NU_LIMIT), "of the law", "Poisson's ratio at small strain."),
     key("tissue", "mu", "float or array", "Pa", Any, "of the law", "Shear modulus (`fung`), or one for each term (`ogden`)."),

@@ -7,9 +7,9 @@ use super::build::Builder;
 use super::file::{BoneSpec, MuscleSpec, SceneFile, TissueSpec, ViscousSpec};
 use super::keys::find;
 use super::tissue::{Fields, Terms};
-use crate::effect::{self, Elements, Law, Muscle, nearest_on_path};
+use crate::effect::{self, Elements, Law, Muscle, Springs, nearest_on_path, springs};
 use crate::energy::Lame;
-use crate::fem::Term;
+use crate::fem::{OnElements, Term};
 use crate::math::Vec3;
 use crate::mesh::TetMesh;
 
@@ -74,6 +74,15 @@ impl Builder<'_> {
         let mut density = vec![0.0; mesh.region_names.len()];
         for (k, spec) in file.tissue.iter().enumerate() {
             let spec = &self.with_preset(spec)?;
+            let mine = |r: u32| material[r as usize] == k;
+            if let Some(E) = self.springs(spec, midsides.is_empty())? {
+                let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
+                density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
+                let elements = (0..mesh.tets.len()).filter(|&e| mine(mesh.region[e])).map(|e| mesh.tets[e]);
+                let tets: Vec<[u32; 4]> = elements.collect();
+                out.terms.push(Box::new(OnElements(Springs(springs(E, &mesh.nodes, &tets)))) as Box<dyn Term>);
+                continue;
+            }
             let (law, constants) = self.law(spec)?;
             let Lame { mu, lambda } = (law.moduli)(&constants);
             let nu = lambda / (2.0 * (lambda + mu));
@@ -86,7 +95,6 @@ impl Builder<'_> {
                      (accurate) does not"
                 ));
             }
-            let mine = |r: u32| material[r as usize] == k;
             density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
             let elements: Vec<usize> = (0..mesh.tets.len()).filter(|&e| mine(mesh.region[e])).collect();
             if !elements.is_empty() {

@@ -18,6 +18,7 @@ mod presets;
 mod programme;
 mod rest_shape;
 mod source;
+mod springs;
 mod tissue;
 
 pub use build::build;

@@ -3,13 +3,14 @@
 //! Along a direction, since det F is linear in each single entry: entrywise differences would be exact and show no order.
 
 use cutis::effect::{
-    DeadLoad, Elements, Gravity, Inertia, LAWS, Measure, Muscle, Pressure, damping_memory, stiffness_damping,
+    DeadLoad, Elements, Gravity, Inertia, LAWS, Measure, Muscle, Pressure, Springs, damping_memory, springs,
+    stiffness_damping,
 };
 use cutis::energy::{
     Corotational, Energy, Fung, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, StableNeoHookean,
     Stretches, VerondaWestmann, WithBulk, Yeoh,
 };
-use cutis::fem::{At, Curvature, Difference, HessianSink, Term, add_midsides};
+use cutis::fem::{At, Curvature, Difference, HessianSink, OnElements, Term, add_midsides};
 use cutis::math::{Mat3, Vec3, vec9};
 use cutis::mesh::TetMesh;
 
@@ -176,6 +177,7 @@ fn terms_have_the_derivatives_they_claim() {
     let m = vec![1.0, 2.0, 0.5, 1.5, 3.0];
     check_term(&Gravity { m: m.clone(), input: 2, scan: Vec3::new(0.3, 0.0, -1.0) }, &rest, SEED + 1);
     check_term(&Inertia { m }, &rest, SEED + 2);
+    check_term(&OnElements(Springs(springs(1.0, &rest, &TETS))), &rest, SEED + 7);
     check_term(&DeadLoad { shares: vec![(1, 0.25), (4, 0.75)], input: 1 }, &rest, SEED + 3);
     check_term(&Pressure { triangles: vec![[0, 1, 2], [1, 4, 2]], input: 3 }, &rest, SEED + 4);
 }

@@ -25,6 +25,8 @@ fn slips_are_answered_with_line_column_and_choices() {
         ("E = 1e4", "E = nan", vec!["line 5", "NaN"]),
         ("E = 1e4", "E = 1e4\nenergy = \"neohookean\"", vec!["line 6", "neohookean", "stable-neo-hookean"]),
         ("nu = 0.4", "c10 = 0.4", vec!["line 6", "`c10` is no constant of `stable-neo-hookean`", "`E`, `nu`"]),
+        ("nu = 0.4", "nu = 0.4\nenergy = \"mass-spring\"", vec!["line 6", "takes `E` alone, not `nu`"]),
+        ("E = 1e4\nnu = 0.4", "energy = \"mass-spring\"", vec!["`E`, which is missing"]),
         ("nu = 0.4", "energy = \"yeoh\"", vec!["`E` is no constant of `yeoh`"]),
         ("E = 1e4\nnu = 0.4", "energy = \"yeoh\"\nc10 = 1.0", vec!["`c20` is missing"]),
         ("\"x_min\"", "\"xmin\"", vec!["line 9", "unknown node set `xmin`", "x_min"]),
@@ -125,7 +127,8 @@ fn every_key_is_documented_and_every_documented_key_exists() {
     }
     let key = KEYS.iter().find(|k| k.table == "tissue" && k.name == "energy").expect("documented");
     let cutis::scene::Range::OneOf(choices) = key.range else { panic!("energies are chosen by name") };
-    assert_eq!(choices, cutis::effect::LAWS.iter().map(|l| l.name).collect::<Vec<_>>());
+    let laws = cutis::effect::LAWS.iter().map(|l| l.name);
+    assert_eq!(choices, laws.chain(["mass-spring"]).collect::<Vec<_>>());
 }
 
 #[test]

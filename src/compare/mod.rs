@@ -1,0 +1,7 @@
+//! Methods that finite elements are compared with, each as its source has it: no scene uses them.
+#![forbid(unsafe_code)]
+#![allow(non_snake_case)]
+
+mod pass_on;
+
+pub use pass_on::{Passed, Rules, pass_on};
