@@ -27,6 +27,8 @@ mod patch;
 mod rigid;
 #[path = "verify/scenes.rs"]
 mod scenes;
+#[path = "verify/sensitivity.rs"]
+mod sensitivity;
 #[path = "verify/sphere.rs"]
 mod sphere;
 #[path = "verify/time.rs"]

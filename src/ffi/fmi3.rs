@@ -656,8 +656,38 @@ pub unsafe extern "C" fn fmi3DeserializeFMUState(
 
 // ---------------------------------------------------------------- derivatives, configuration, clocks, model exchange
 
+/// `fmi3GetDirectionalDerivative`: one solve with the stiffness of the accepted state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
+    instance: fmi3Instance,
+    unknowns: *const u32,
+    nUnknowns: usize,
+    knowns: *const u32,
+    nKnowns: usize,
+    seed: *const f64,
+    nSeed: usize,
+    sensitivity: *mut f64,
+    nSensitivity: usize,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (unknowns, knowns, seed, sensitivity) = unsafe {
+            (
+                slice(unknowns, nUnknowns, "unknowns")?,
+                slice(knowns, nKnowns, "knowns")?,
+                slice(seed, nSeed, "seed")?,
+                slice_mut(sensitivity, nSensitivity, "sensitivity")?,
+            )
+        };
+        check_lengths(i, knowns, Type::Float64, seed.len())?;
+        check_lengths(i, unknowns, Type::Float64, sensitivity.len())?;
+        i.directional_derivative(unknowns, knowns, seed, sensitivity)
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(instance, table::GET_DIRECTIONAL_DERIVATIVE, body) }
+}
+
 not_offered! {
-    fmi3GetDirectionalDerivative(unknowns: *const u32, nUnknowns: usize, knowns: *const u32, nKnowns: usize, seed: *const f64, nSeed: usize, sensitivity: *mut f64, nSensitivity: usize): "directional derivatives are not provided";
     fmi3GetAdjointDerivative(unknowns: *const u32, nUnknowns: usize, knowns: *const u32, nKnowns: usize, seed: *const f64, nSeed: usize, sensitivity: *mut f64, nSensitivity: usize): "adjoint derivatives are not provided";
     fmi3EnterConfigurationMode(): "there are no structural parameters";
     fmi3ExitConfigurationMode(): "there are no structural parameters";

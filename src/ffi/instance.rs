@@ -275,6 +275,24 @@ impl Instance {
         self.sim.get_f64(port, offset, out).map_err(|why| error(chain(&why)))
     }
 
+    /// Directional derivative of Float64 variables by Float64 inputs, all named by value reference.
+    pub(super) fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Answer {
+        let ports = |references: &[u32]| -> Result<Vec<usize>, Refusal> {
+            references.iter().map(|&r| Ok(self.port(r, Type::Float64)?.0)).collect()
+        };
+        let (unknowns, knowns) = (ports(unknowns)?, ports(knowns)?);
+        if let Some(&port) = unknowns.first() {
+            self.before_get(port)?;
+        }
+        self.sim.directional_derivative(&knowns, seed, &unknowns, sensitivity).map_err(|why| error(chain(&why)))
+    }
+
     pub(super) fn get_i32(&self, port: usize, offset: usize, out: &mut [i32]) -> Answer {
         self.sim.get_i32(port, offset, out).map_err(|why| error(chain(&why)))
     }

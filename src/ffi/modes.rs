@@ -70,6 +70,7 @@ pub(super) mod fmi3 {
     pub const SERIALIZED_FMU_STATE_SIZE: Call = call("fmi3SerializedFMUStateSize", ANY);
     pub const SERIALIZE_FMU_STATE: Call       = call("fmi3SerializeFMUState", ANY);
     pub const DESERIALIZE_FMU_STATE: Call     = call("fmi3DeserializeFMUState", ANY);
+    pub const GET_DIRECTIONAL_DERIVATIVE: Call = call("fmi3GetDirectionalDerivative", INITIALIZATION | STEP);
     pub const fn get(name: &'static str) -> Call { call(name, GET) }
     pub const fn set(name: &'static str) -> Call { call(name, SET) }
 }

@@ -32,7 +32,7 @@ pub fn description(scene: &Loaded, version: FmiVersion) -> String {
         root.push(("numberOfEventIndicators", "0".to_owned()));
     }
     document("fmiModelDescription", root, |xml| {
-        co_simulation(xml, version);
+        co_simulation(xml, version, model);
         let types = Types::of(&ports);
         types.write_units(xml);
         types.write_definitions(xml, version);
@@ -84,7 +84,7 @@ pub fn terminals(model: &Model) -> String {
     })
 }
 
-fn co_simulation(xml: &mut Xml, version: FmiVersion) {
+fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
     let claims: &[&'static str] = match version {
         FmiVersion::V3 => &["canHandleVariableCommunicationStepSize", "canGetAndSetFMUState", "canSerializeFMUState"],
         FmiVersion::V2 => &[
@@ -96,6 +96,9 @@ fn co_simulation(xml: &mut Xml, version: FmiVersion) {
     };
     let mut attributes: Attributes = vec![("modelIdentifier", MODEL_IDENTIFIER.to_owned())];
     attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
+    if version == FmiVersion::V3 && model.has_derivatives() {
+        attributes.push(("providesDirectionalDerivatives", "true".to_owned()));
+    }
     empty(xml, "CoSimulation", attributes);
 }
 

@@ -76,7 +76,13 @@ impl Sim {
         Ok(())
     }
 
-    fn port(&self, k: usize, ty: Type, wanted: &'static str, also: impl Fn(&Port) -> bool) -> Result<&Port, SimError> {
+    pub(super) fn port(
+        &self,
+        k: usize,
+        ty: Type,
+        wanted: &'static str,
+        also: impl Fn(&Port) -> bool,
+    ) -> Result<&Port, SimError> {
         let ports = self.model.ports();
         ports.get(k).filter(|p| p.ty == ty && also(p)).ok_or(SimError::Port { port: k, n_ports: ports.len(), wanted })
     }

@@ -3,6 +3,7 @@
 #![allow(non_snake_case)]
 
 mod access;
+mod derivative;
 mod model;
 mod motion;
 mod pace;
@@ -126,6 +127,9 @@ pub enum SimError {
         /// Position found.
         z: f64,
     },
+    /// A derivative that the scene or the state does not have.
+    #[error("no derivative: {0}")]
+    NoDerivative(String),
     /// `[inertia] start = "rest"` with bones that do not start at rest.
     #[error(
         "the scene starts at rest, but bone `{0}` does not: give it a start pose of zero or start = \"equilibrium\""
@@ -138,6 +142,8 @@ pub struct Sim {
     model: Arc<Model>,
     state: State,
     work: step::Workspace,
+    /// Made when the first derivative is asked for.
+    sensitivity: Option<Box<derivative::Sensitivity>>,
 }
 
 impl Sim {
@@ -148,7 +154,7 @@ impl Sim {
     pub fn new(model: Arc<Model>) -> Result<Sim, SimError> {
         let state = State::start(&model);
         let work = step::Workspace::new(&model)?;
-        Ok(Sim { model, state, work })
+        Ok(Sim { model, state, work, sensitivity: None })
     }
 
     /// The model it moves.

@@ -184,6 +184,11 @@ impl Model {
         self
     }
 
+    /// Whether its outputs follow from its inputs alone, so that they have derivatives by them.
+    pub fn has_derivatives(&self) -> bool {
+        self.parts.inertia.is_none() && self.parts.n_history == 0
+    }
+
     /// Name of the scene.
     pub fn name(&self) -> &str {
         &self.parts.name

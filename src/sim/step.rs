@@ -498,14 +498,14 @@ fn input3(inputs: &[f64], first: Option<usize>, row: usize) -> Vec3 {
     first.map_or(Vec3::zeros(), |f| Vec3::from_column_slice(&inputs[f + 3 * row..f + 3 * row + 3]))
 }
 
-fn read_pivots(model: &Model, inputs: &[f64], pivots: &mut [Vec3]) {
+pub(super) fn read_pivots(model: &Model, inputs: &[f64], pivots: &mut [Vec3]) {
     let first = model.parts().layout.first(Slot::BonePivot);
     for (b, pivot) in pivots.iter_mut().enumerate() {
         *pivot = input3(inputs, first, b);
     }
 }
 
-fn read_wrenches(model: &Model, inputs: &[f64], wrenches: &mut [(Vec3, Vec3)]) {
+pub(super) fn read_wrenches(model: &Model, inputs: &[f64], wrenches: &mut [(Vec3, Vec3)]) {
     let layout = &model.parts().layout;
     let (force, torque) = (layout.first(Slot::BoneForce), layout.first(Slot::BoneTorque));
     for (body, wrench) in model.dofs().bodies.iter().zip(wrenches) {
@@ -514,7 +514,7 @@ fn read_wrenches(model: &Model, inputs: &[f64], wrenches: &mut [(Vec3, Vec3)]) {
 }
 
 /// Writes the poses that the inputs ask for; nodes stay where they are.
-fn place_bones(model: &Model, inputs: &[f64], config: &mut Configuration) {
+pub(super) fn place_bones(model: &Model, inputs: &[f64], config: &mut Configuration) {
     let layout = &model.parts().layout;
     let (translation, rotation) = (layout.first(Slot::BoneTranslation), layout.first(Slot::BoneRotation));
     for (b, bone) in model.parts().bones.iter().enumerate() {
@@ -525,7 +525,13 @@ fn place_bones(model: &Model, inputs: &[f64], config: &mut Configuration) {
 }
 
 /// `u`: how far each prescribed node has to go.
-fn target_increments(model: &Model, inputs: &[f64], pivots: &[Vec3], config: &Configuration, u: &mut [Vec3]) {
+pub(super) fn target_increments(
+    model: &Model,
+    inputs: &[f64],
+    pivots: &[Vec3],
+    config: &Configuration,
+    u: &mut [Vec3],
+) {
     let parts = model.parts();
     for (b, bone) in parts.bones.iter().enumerate() {
         let displacement = parts.layout.first(Slot::BoneNodal(b as u32));

@@ -165,6 +165,11 @@ impl Minimiser {
         Ok(())
     }
 
+    /// `d <- K^-1 d` with the factor at hand.
+    pub fn apply_inverse(&mut self, d: &mut [Vec3]) {
+        self.cholesky.solve(d);
+    }
+
     /// Moves `config` to where the factor at hand expects the equilibrium once the prescribed nodes have gone by `u`:
     /// `K d = -(g + K_p u)`. The prescribed nodes of `config` are moved, too.
     pub fn predict(&mut self, problem: &Problem, config: &mut Configuration, u: &[Vec3]) {

@@ -1,0 +1,268 @@
+//! How the accepted equilibrium moves with its inputs.
+//!
+//! ```text
+//! g(x, s) = 0   =>   K dx = -(K_p du_p + dg/ds ds),   du_p: motion of the bones' nodes with their poses
+//! ```
+//!
+//! One solve with the stiffness of the accepted state, factored when the first derivative there is asked for; the
+//! simulation itself keeps its own factor and its bits. Products on the right are central differences along the seed;
+//! where forces follow the surface, what `K` leaves out of their change is taken in by iteration.
+//!
+//! Source: Oden & Prudhomme, "Estimation of modeling error in computational mechanics", J. Comput. Phys. 182, 2002, for the
+//! linearised equilibrium; the differences are ours.
+
+use super::step::{place_bones, read_pivots, read_wrenches, target_increments};
+use super::{Model, Sim, SimError, State};
+use crate::fem::{At, Configuration};
+use crate::math::Vec3;
+use crate::port::{Slot, Type};
+use crate::solve::{Minimiser, Problem, Strategy};
+
+/// Largest motion in a difference, in sizes of the model: far above round-off, far below what curves the answer.
+const CHANGE: f64 = 1e-5;
+/// Largest change of an input (SI units) by which the motion is first estimated.
+const FIRST_CHANGE: f64 = 1e-4;
+/// Passes that follower forces get, and the relative correction at which they end.
+const MOST_PASSES: usize = 30;
+const SETTLED: f64 = 1e-8;
+
+/// The factored stiffness of one accepted state.
+pub(super) struct Sensitivity {
+    minimiser: Minimiser,
+    config: Configuration,
+    inputs: Vec<f64>,
+}
+
+/// Inputs along the seed, with what follows from them at once.
+struct Moved {
+    inputs: Vec<f64>,
+    pivots: Vec<Vec3>,
+    wrenches: Vec<(Vec3, Vec3)>,
+    config: Configuration,
+}
+
+/// What a configuration holds the bones with.
+struct Held {
+    nodal: Vec<Vec3>,
+    g: Vec<Vec3>,
+    config: Configuration,
+    pivots: Vec<Vec3>,
+}
+
+/// Along the seed, and against it.
+struct Sides([Held; 2]);
+
+impl Sides {
+    /// How far a node is from one to the other at most, halved, m.
+    fn motion(&self) -> f64 {
+        let [p, m] = &self.0;
+        0.5 * p.config.x.iter().zip(&m.config.x).map(|(p, m)| (p - m).norm()).fold(0.0, f64::max)
+    }
+}
+
+impl Sim {
+    /// Change of the ports `unknowns` with the ports `knowns` along `seed`, at the last accepted state: `sensitivity` is
+    /// overwritten with the directional derivative of each element of the unknowns, one after another.
+    ///
+    /// Knowns are inputs; unknowns are `skin.position`, `marker.position`, `bone.reactionForce` and `bone.reactionTorque`,
+    /// or inputs themselves. Linear in the seed to about eight digits.
+    ///
+    /// # Errors
+    /// [`SimError::NoDerivative`] in scenes with inertia or memory and before the first equilibrium, [`SimError::Port`],
+    /// [`SimError::Range`], and as for [`Sim::step`] if the stiffness cannot be factored. The state does not change.
+    pub fn directional_derivative(
+        &mut self,
+        knowns: &[usize],
+        seed: &[f64],
+        unknowns: &[usize],
+        sensitivity: &mut [f64],
+    ) -> Result<(), SimError> {
+        let model = self.model.clone();
+        check(&model, &self.state)?;
+        let mut direction = vec![0.0; model.parts().layout.len()];
+        let mut left = seed;
+        for &known in knowns {
+            let port =
+                self.port(known, Type::Float64, "an input that derivatives can be taken by", |p| p.is_settable())?;
+            let first = model.parts().layout.first(port.slot).expect("every settable port lies in the layout");
+            let (now, later) = left.split_at_checked(port.len()).ok_or_else(|| mismatch("seed", port.len(), left))?;
+            direction[first..first + now.len()].copy_from_slice(now);
+            left = later;
+        }
+        if !left.is_empty() {
+            return Err(mismatch("seed", 0, left));
+        }
+        if !direction.iter().all(|v| v.is_finite()) {
+            return Err(SimError::NoDerivative("the seed is not finite".into()));
+        }
+        let scale = direction.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        if scale == 0.0 {
+            sensitivity.fill(0.0);
+            return Ok(());
+        }
+        let first = FIRST_CHANGE / scale;
+        let motion = self.sides(&model, &direction, first, 1)?.motion();
+        let X = &model.mesh().nodes;
+        let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
+        let h = if motion > 0.0 { first * CHANGE * (high - low).norm() / motion } else { first };
+        let Sides(sides) = self.sides(&model, &direction, h, MOST_PASSES)?;
+        let mut left = sensitivity;
+        for &unknown in unknowns {
+            let port = self.port(unknown, Type::Float64, "an output that has derivatives", has_derivative)?;
+            let n = port.len();
+            if n > left.len() {
+                return Err(mismatch("sensitivity", n, left));
+            }
+            let (now, later) = left.split_at_mut(n);
+            read(&model, &sides, port.slot, &direction, h, now);
+            left = later;
+        }
+        if left.is_empty() { Ok(()) } else { Err(mismatch("sensitivity", 0, left)) }
+    }
+
+    /// The equilibria a step `h` along the direction and against it, to first order; one pass leaves out how follower
+    /// forces change.
+    fn sides(&mut self, model: &Model, direction: &[f64], h: f64, passes: usize) -> Result<Sides, SimError> {
+        let parts = model.parts();
+        let here = &self.state.config;
+        let moved = [1.0, -1.0].map(|sign| {
+            let inputs: Vec<f64> =
+                self.state.applied.iter().zip(direction).map(|(value, d)| value + sign * h * d).collect();
+            let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
+            read_pivots(model, &inputs, &mut pivots);
+            let mut wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
+            read_wrenches(model, &inputs, &mut wrenches);
+            let mut config = here.clone();
+            place_bones(model, &inputs, &mut config);
+            let mut u = vec![Vec3::zeros(); model.dofs().prescribed.len()];
+            target_increments(model, &inputs, &pivots, &config, &mut u);
+            for (&a, u) in model.dofs().prescribed.iter().zip(&u) {
+                config.x[a as usize] += u;
+            }
+            Moved { inputs, pivots, wrenches, config }
+        });
+        let known = self.sensitivity.as_ref().is_some_and(|s| s.config == *here && s.inputs == self.state.applied);
+        if !known {
+            self.sensitivity = None;
+            self.sensitivity = Some(Box::new(Sensitivity::new(model, &self.state)?));
+        }
+        let minimiser = &mut self.sensitivity.as_mut().expect("made above").minimiser;
+        let n = model.dofs().n_blocks();
+        let mut d = vec![Vec3::zeros(); n];
+        let follows = parts.terms.iter().any(|t| t.is_lagged()) || !model.dofs().bodies.is_empty();
+        for _ in 0..passes {
+            let sides = [0, 1].map(|k| moved[k].held(model, self.state.t, &d, if k == 0 { h } else { -h }));
+            let mut change: Vec<Vec3> = sides[0].g.iter().zip(&sides[1].g).map(|(p, m)| (p - m) / (2.0 * h)).collect();
+            minimiser.apply_inverse(&mut change);
+            let (mut size, mut correction) = (0.0_f64, 0.0_f64);
+            for (d, c) in d.iter_mut().zip(&change) {
+                *d -= c;
+                size = size.max(d.norm());
+                correction = correction.max(c.norm());
+            }
+            if !follows || passes == 1 || correction <= SETTLED * size {
+                let held = |k: usize| moved[k].held(model, self.state.t, &d, if k == 0 { h } else { -h });
+                return Ok(Sides([held(0), held(1)]));
+            }
+        }
+        Err(SimError::NoDerivative("the forces that follow the surface are too strong for the stiffness".into()))
+    }
+}
+
+impl Sensitivity {
+    fn new(model: &Model, state: &State) -> Result<Sensitivity, SimError> {
+        let parts = model.parts();
+        let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
+        read_pivots(model, &state.applied, &mut pivots);
+        let mut wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
+        read_wrenches(model, &state.applied, &mut wrenches);
+        let problem = Problem {
+            terms: &parts.terms,
+            dofs: model.dofs(),
+            X: &parts.mesh.nodes,
+            pivots: &pivots,
+            wrenches: &wrenches,
+            at: At { t: state.t, inputs: &state.applied, ..At::NOWHERE },
+        };
+        let mut minimiser = Minimiser::new(&problem, Strategy { memory: 0, ..parts.strategy })?;
+        minimiser.linearise(&problem, &state.config)?;
+        Ok(Sensitivity { minimiser, config: state.config.clone(), inputs: state.applied.clone() })
+    }
+}
+
+impl Moved {
+    /// Gradients with the unknowns moved by `h d`; forces that follow the surface do so.
+    fn held(&self, model: &Model, t: f64, d: &[Vec3], h: f64) -> Held {
+        let parts = model.parts();
+        let mut config = self.config.clone();
+        model.dofs().retract(&parts.mesh.nodes, &self.pivots, &self.config, h, d, &mut config);
+        let problem = Problem {
+            terms: &parts.terms,
+            dofs: model.dofs(),
+            X: &parts.mesh.nodes,
+            pivots: &self.pivots,
+            wrenches: &self.wrenches,
+            at: At { t, inputs: &self.inputs, ..At::NOWHERE },
+        };
+        let mut nodal = vec![Vec3::zeros(); parts.mesh.nodes.len()];
+        let mut g = vec![Vec3::zeros(); model.dofs().n_blocks()];
+        problem.gradient(&config, &config, &mut nodal, &mut g);
+        Held { nodal, g, config, pivots: self.pivots.clone() }
+    }
+}
+
+fn check(model: &Model, state: &State) -> Result<(), SimError> {
+    let why = if !model.has_derivatives() {
+        "the scene has inertia or tissue with a memory, so its state depends on the way it came"
+    } else if !state.outputs.converged {
+        "there is no equilibrium yet: initialise, or make a step"
+    } else {
+        return Ok(());
+    };
+    Err(SimError::NoDerivative(why.into()))
+}
+
+fn mismatch(name: &str, wanted: usize, found: &[f64]) -> SimError {
+    SimError::Range { name: name.into(), len: found.len(), offset: 0, end: wanted }
+}
+
+fn has_derivative(port: &crate::port::Port) -> bool {
+    use Slot::{BoneReactionForce, BoneReactionTorque, MarkerPosition, SkinPosition};
+    port.is_settable() || matches!(port.slot, SkinPosition | MarkerPosition | BoneReactionForce | BoneReactionTorque)
+}
+
+/// The derivative of one port.
+fn read(model: &Model, sides: &[Held; 2], slot: Slot, direction: &[f64], h: f64, out: &mut [f64]) {
+    let of = |value: &dyn Fn(&Held) -> Vec3| (value(&sides[0]) - value(&sides[1])) / (2.0 * h);
+    let rows = |row: &dyn Fn(usize, &Held) -> Vec3, out: &mut [f64]| {
+        for (k, out) in out.chunks_exact_mut(3).enumerate() {
+            out.copy_from_slice(of(&|side| row(k, side)).as_slice());
+        }
+    };
+    let parts = model.parts();
+    match slot {
+        Slot::SkinPosition => rows(&|k, side| model.skin().of(k, &side.config.x), out),
+        Slot::MarkerPosition => rows(
+            &|k, side| {
+                let marker = &parts.markers[k];
+                model.skin().within(marker.nodes, marker.weights, &side.config.x)
+            },
+            out,
+        ),
+        Slot::BoneReactionForce => {
+            rows(&|k, side| parts.bones[k].nodes.iter().map(|&a| -side.nodal[a as usize]).sum(), out);
+        }
+        Slot::BoneReactionTorque => rows(
+            &|k, side| {
+                let pivot = side.pivots[k] + side.config.poses[k].t;
+                let torque = |&a: &u32| (pivot - side.config.x[a as usize]).cross(&side.nodal[a as usize]);
+                parts.bones[k].nodes.iter().map(torque).sum()
+            },
+            out,
+        ),
+        input => {
+            let first = parts.layout.first(input).expect("every other port is an input");
+            out.copy_from_slice(&direction[first..first + out.len()]);
+        }
+    }
+}
