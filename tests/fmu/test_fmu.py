@@ -338,6 +338,28 @@ def test_outputs_in_initialization_mode_do_not_change_the_bits(host3, jaw, throu
     assert np.array_equal(host3.get("skin.position").ravel(), through_c["skin.position"][-1])
 
 
+def test_directional_derivatives_meet_differences(host3, jaw):
+    host = host3
+    drive(host, jaw[:3], ["skin.position"])
+    seed = np.zeros(host.shape("bone.translation"))
+    seed[-1] = [0.5, -1.0, 0.25]
+    known, unknown = (host.variables[name].valueReference for name in ("bone.translation", "skin.position"))
+    n = int(np.prod(host.shape("skin.position")))
+    slope = np.array(host.fmu.getDirectionalDerivative([unknown], [known], list(seed.ravel()), n))
+    twice = np.array(host.fmu.getDirectionalDerivative([unknown], [known], list(2 * seed.ravel()), n))
+    assert np.abs(twice - 2 * slope).max() < 1e-6 * np.abs(slope).max()
+    here, state, h = np.asarray(host.get("bone.translation")).copy(), host.fmu.getFMUState(), 2.0**-12
+    sides = []
+    for sign in (1, -1):
+        host.fmu.setFMUState(state)
+        host.set("bone.translation", here + sign * h * seed)
+        host.step(3 * DT, DT)
+        sides.append(np.asarray(host.get("skin.position")).ravel().copy())
+    host.fmu.freeFMUState(state)
+    difference = (sides[0] - sides[1]) / (2 * h)
+    assert np.abs(difference - slope).max() < 2e-3 * np.abs(slope).max()
+
+
 def test_parallel_instances_do_not_meet(archive3, jaw, through_c):
     hosts = [Host3(archive3) for _ in range(3)]
     results = [None] * len(hosts)
