@@ -577,11 +577,76 @@ pub unsafe extern "C" fn fmi2GetStringStatus(c: fmi2Component, s: c_int, value: 
     unsafe { tell(c, "fmi2GetStringStatus", value, |_| None) }
 }
 
+// ---------------------------------------------------------------- derivatives
+
+/// `fmi2GetDirectionalDerivative`: one solve with the stiffness of the accepted state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
+    c: fmi2Component,
+    vUnknown_ref: *const c_uint,
+    nUnknown: usize,
+    vKnown_ref: *const c_uint,
+    nKnown: usize,
+    dvKnown: *const f64,
+    dvUnknown: *mut f64,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (unknowns, knowns, seed, sensitivity) = unsafe {
+            (
+                slice(vUnknown_ref, nUnknown, "vUnknown_ref")?,
+                slice(vKnown_ref, nKnown, "vKnown_ref")?,
+                slice(dvKnown, nKnown, "dvKnown")?,
+                slice_mut(dvUnknown, nUnknown, "dvUnknown")?,
+            )
+        };
+        // Whole ports are asked for; the host's scalars are parts of them.
+        let (known, unknown) = (Whole::of(i, knowns)?, Whole::of(i, unknowns)?);
+        let mut whole_seed = vec![0.0; known.len];
+        for (at, range) in &known.runs {
+            whole_seed[*at..at + range.len()].copy_from_slice(&seed[range.clone()]);
+        }
+        let mut whole = vec![0.0; unknown.len];
+        i.directional_derivative(&unknown.references, &known.references, &whole_seed, &mut whole)?;
+        for (at, range) in unknown.runs {
+            sensitivity[range.clone()].copy_from_slice(&whole[at..at + range.len()]);
+        }
+        Ok(())
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(c, table::GET_DIRECTIONAL_DERIVATIVE, body) }
+}
+
+/// The ports that scalars belong to, one after another, and where each run of scalars lies among their elements.
+#[derive(Default)]
+struct Whole {
+    references: Vec<u32>,
+    len: usize,
+    runs: Vec<(usize, std::ops::Range<usize>)>,
+}
+
+impl Whole {
+    fn of(i: &mut Instance, scalars: &[c_uint]) -> Result<Whole, Refusal> {
+        let mut whole = Whole::default();
+        let mut first = std::collections::BTreeMap::new();
+        each_run(i, scalars, Type::Float64, |i, port, offset, range| {
+            let p = &i.sim.model().ports()[port];
+            let at = *first.entry(port).or_insert_with(|| {
+                whole.references.push(p.reference);
+                whole.len += p.len();
+                whole.len - p.len()
+            });
+            whole.runs.push((at + offset, range));
+            Ok(())
+        })?;
+        Ok(whole)
+    }
+}
+
 // ---------------------------------------------------------------- not offered
 
 not_offered! {
     fmi2CancelStep(): "no step runs asynchronously";
-    fmi2GetDirectionalDerivative(vUnknown_ref: *const c_uint, nUnknown: usize, vKnown_ref: *const c_uint, nKnown: usize, dvKnown: *const f64, dvUnknown: *mut f64): "directional derivatives are not provided";
     fmi2SetRealInputDerivatives(vr: *const c_uint, nvr: usize, order: *const c_int, value: *const f64): "inputs are not interpolated";
     fmi2GetRealOutputDerivatives(vr: *const c_uint, nvr: usize, order: *const c_int, value: *mut f64): "output derivatives are not provided";
     fmi2EnterEventMode(): "this component offers co-simulation only";

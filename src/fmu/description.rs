@@ -96,8 +96,12 @@ fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
     };
     let mut attributes: Attributes = vec![("modelIdentifier", MODEL_IDENTIFIER.to_owned())];
     attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
-    if version == FmiVersion::V3 && model.has_derivatives() {
-        attributes.push(("providesDirectionalDerivatives", "true".to_owned()));
+    if model.has_derivatives() {
+        let claim = match version {
+            FmiVersion::V3 => "providesDirectionalDerivatives",
+            FmiVersion::V2 => "providesDirectionalDerivative",
+        };
+        attributes.push((claim, "true".to_owned()));
     }
     empty(xml, "CoSimulation", attributes);
 }

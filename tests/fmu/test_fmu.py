@@ -360,6 +360,21 @@ def test_directional_derivatives_meet_differences(host3, jaw):
     assert np.abs(difference - slope).max() < 2e-3 * np.abs(slope).max()
 
 
+def test_directional_derivatives_are_those_of_fmi3(host3, host2, jaw):
+    names = ["marker.position", "bone.reactionForce"]
+    n = [int(np.prod(host3.shape(name))) for name in names]
+    for host in (host3, host2):
+        drive(host, jaw[:3], names)
+    seed = np.zeros(host3.shape("bone.translation")).ravel()
+    seed[-3:] = [0.5, -1.0, 0.25]
+    wanted = host3.fmu.getDirectionalDerivative(
+        [host3.variables[name].valueReference for name in names],
+        [host3.variables["bone.translation"].valueReference], list(seed), sum(n))
+    unknowns = [r for name in names for r in host2._scalars(name)]
+    found = host2.fmu.getDirectionalDerivative(unknowns[::-1], host2._scalars("bone.translation"), list(seed))
+    assert np.array_equal(np.array(found)[::-1], np.array(wanted))
+
+
 def test_parallel_instances_do_not_meet(archive3, jaw, through_c):
     hosts = [Host3(archive3) for _ in range(3)]
     results = [None] * len(hosts)
