@@ -75,6 +75,12 @@ fn cpp11_smoke() {
 }
 
 #[test]
+fn cpp17_wrapper() {
+    let said = build_and_run("c++", "-std=c++17", &root().join("tests/c/wrapper.cpp"), false);
+    assert!(said.contains("wrapper: all is well"), "{said}");
+}
+
+#[test]
 fn fmi_functions_survive_misuse() {
     let said = build_and_run("cc", "-std=c99", &root().join("tests/c/misuse.c"), true);
     assert!(said.contains("misuse: all is well"), "{said}");

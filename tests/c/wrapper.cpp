@@ -1,0 +1,57 @@
+// The C++17 wrapper: owners move, failures throw with their text, states return.
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+#include "cutis.hpp"
+
+#undef NDEBUG
+#include <cassert>
+
+static const char *scene = "[mesh.block]\nsize = [0.06, 0.04, 0.02]\ncells = [3, 2, 1]\n[[tissue]]\nE = 15e3\nnu = 0.4\n"
+                           "[[bone]]\nname = \"skull\"\nnodes = \"x_min\"\ndrive = \"held\"\n"
+                           "[[bone]]\nname = \"jaw\"\nnodes = \"x_max\"\n";
+
+int main() {
+    cutis::Sim first = cutis::Sim::from_text(scene);
+    cutis::Sim sim = std::move(first);
+    sim.initialise();
+    const std::size_t skin = sim.port("skin.position");
+    assert(sim.shape(skin).size() == 2 && sim.shape(skin)[1] == 3 && sim.unit(skin) == "m");
+    assert(sim.type(skin) == CUTIS_FLOAT64 && sim.causality(skin) == CUTIS_OUTPUT);
+    assert(sim.ports().size() > 5 && !sim.description(skin).empty() && sim.token().size() == 38);
+    assert(sim.get_int("skin.triangles").size() % 3 == 0);
+
+    const cutis::State rest = sim.save();
+    sim.set("bone.translation", {0.0, 0.0, 0.0, 0.002, 0.0, 0.0});
+    sim.step(0.1);
+    const std::vector<double> moved = sim.get("skin.position");
+    assert(sim.get_bool("solver.converged") && sim.warning().empty());
+    const std::vector<std::uint8_t> bytes = sim.serialize(sim.save());
+
+    sim.restore(rest);
+    std::vector<double> back(sim.size(skin));
+    sim.get(skin, cutis::View<double>(back));
+    assert(back != moved && sim.time() == 0.0);
+    sim.restore(sim.deserialize(bytes));
+    assert(sim.get("skin.position") == moved && std::fabs(sim.time() - 0.1) < 1e-15);
+
+    int thrown = 0;
+    auto refused = [&](CutisStatus status, const char *part, auto call) {
+        try {
+            call();
+        } catch (const cutis::Error &error) {
+            assert(error.status() == status && std::strstr(error.what(), part));
+            ++thrown;
+        }
+    };
+    refused(CUTIS_ARGUMENT, "no port", [&] { sim.get("no.such"); });
+    refused(CUTIS_ARGUMENT, "", [&] { sim.set("bone.translation", {1.0}); });
+    refused(CUTIS_ARGUMENT, "", [&] { sim.step(-1.0); });
+    refused(CUTIS_ARGUMENT, "line 1", [&] { cutis::Sim::from_text("nonsense"); });
+    refused(CUTIS_STATE, "", [&] { sim.deserialize(std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + 40)); });
+    assert(thrown == 5);
+    assert(sim.get("skin.position") == moved);
+    std::puts("wrapper: all is well");
+    return 0;
+}
