@@ -12,7 +12,7 @@ use crate::effect::Elements;
 use crate::fem::{At, Configuration, Dofs, Material, Term};
 use crate::math::{Mat3, Mat9, Pose, Vec3};
 use crate::mesh::{TetMesh, signed_volume};
-use crate::solve::{Minimiser, Problem, SolveError, Strategy};
+use crate::solve::{Minimiser, Precision, Problem, SolveError, Strategy};
 
 /// Depth at the corners of the mesh.
 pub(super) struct Depth(Vec<f64>);
@@ -84,7 +84,14 @@ fn solve(mesh: &TetMesh, n: usize, skin: &[u32], bones: &BTreeSet<u32>) -> Resul
     let terms: Vec<Box<dyn Term>> = vec![Elements { X, tets: &mesh.tets, midsides: &[] }.of(Harmonic)];
     let problem = Problem { terms: &terms, dofs: &dofs, X, pivots: &[], wrenches: &[], at: At::NOWHERE };
     // The first solve is exact; a correction of a millionth of the whole range ends it.
-    let strategy = Strategy { memory: 1, refresh_after: 2, tolerance: 1e-6, max_iterations: 20, without: None };
+    let strategy = Strategy {
+        memory: 1,
+        refresh_after: 2,
+        tolerance: 1e-6,
+        max_iterations: 20,
+        precision: Precision::Double,
+        without: None,
+    };
     let mut minimiser = Minimiser::new(&problem, strategy)?;
     minimiser.linearise(&problem, &config)?;
     minimiser.minimise(&problem, &mut config)?;

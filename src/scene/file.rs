@@ -301,6 +301,7 @@ pub struct SolverSpec {
     pub tolerance: Option<Spanned<f64>>,
     pub max_iterations: Option<Spanned<u32>>,
     pub inversion: Option<Spanned<String>>,
+    pub precision: Option<Spanned<String>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

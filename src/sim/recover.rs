@@ -10,13 +10,19 @@
 use super::model::Model;
 use crate::fem::{At, Configuration};
 use crate::math::Vec3;
-use crate::solve::{Minimiser, Outcome, Problem, SolveError, Strategy};
+use crate::solve::{Minimiser, Outcome, Precision, Problem, SolveError, Strategy};
 
 /// The stand-in only has to untangle, so it is solved coarsely: share of the model's size that the last correction may be.
 const COARSE: f64 = 1e-4;
 /// Pairs that its quasi-Newton method remembers, iterations to a new factor, and at most.
-const STRATEGY: Strategy =
-    Strategy { memory: 8, refresh_after: 10, tolerance: 0.0, max_iterations: 500, without: None };
+const STRATEGY: Strategy = Strategy {
+    memory: 8,
+    refresh_after: 10,
+    tolerance: 0.0,
+    max_iterations: 500,
+    precision: Precision::Double,
+    without: None,
+};
 
 /// Moves the free nodes of `config` to the equilibrium of the stand-in. Allocates: this is no common step.
 pub(super) fn untangle(model: &Model, pivots: &[Vec3], config: &mut Configuration) -> Result<Outcome, SolveError> {

@@ -2,20 +2,24 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::perm::PermRef;
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::{LinearSolver, SolveError, nested_dissection};
+use super::panels::Panels;
+use super::{LinearSolver, Precision, SolveError, nested_dissection};
 use crate::fem::{BlockMatrix, Pattern};
 use crate::math::Vec3;
 
 /// Most entries of a factor: 12 GB of numbers.
 pub const MOST_ENTRIES: usize = 1_500_000_000;
 
-/// Supernodal Cholesky in double precision, one thread; the same bits whatever the machine's load.
+/// Supernodal Cholesky on one thread; the same bits whatever the machine's load. The factor is always made in double
+/// precision, so what is called positive definite does not depend on how it is solved with.
 pub struct Cholesky {
     scalar: SymbolicSparseColMat<u32>,
     values: Vec<f64>,
@@ -23,6 +27,8 @@ pub struct Cholesky {
     factor: Vec<f64>,
     rhs: Vec<f64>,
     scratch: MemBuffer,
+    /// The factor for solves in single precision.
+    panels: Option<Panels>,
 }
 
 impl Cholesky {
@@ -30,7 +36,7 @@ impl Cholesky {
     ///
     /// # Errors
     /// [`SolveError::TooLarge`] for a factor beyond [`MOST_ENTRIES`].
-    pub fn analyse(pattern: &Pattern) -> Result<Cholesky, SolveError> {
+    pub fn analyse(pattern: &Pattern, precision: Precision) -> Result<Cholesky, SolveError> {
         let n = 3 * pattern.n();
         let scalar = scalar_pattern(pattern);
         let order = nested_dissection(pattern).map(|blocks| {
@@ -46,9 +52,12 @@ impl Cholesky {
             None => SymmetricOrdering::Amd,
         };
         let too_large = |entries: usize| SolveError::TooLarge { unknowns: n, entries, limit: MOST_ENTRIES };
-        let symbolic =
-            factorize_symbolic_cholesky(scalar.as_ref(), Side::Lower, ordering, CholeskySymbolicParams::default())
-                .map_err(|_| too_large(u32::MAX as usize))?;
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        let symbolic = factorize_symbolic_cholesky(scalar.as_ref(), Side::Lower, ordering, params)
+            .map_err(|_| too_large(u32::MAX as usize))?;
         if symbolic.len_val() > MOST_ENTRIES {
             return Err(too_large(symbolic.len_val()));
         }
@@ -56,7 +65,12 @@ impl Cholesky {
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
         );
+        let panels = match symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(raw) if precision == Precision::Single => Some(Panels::new(raw)),
+            _ => None,
+        };
         Ok(Cholesky {
+            panels,
             values: vec![0.0; scalar.row_idx().len()],
             factor: vec![0.0; symbolic.len_val()],
             rhs: vec![0.0; n],
@@ -89,10 +103,31 @@ impl LinearSolver for Cholesky {
             .map(drop)
             .map_err(|e| match e {
                 faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index } => index / 3,
-            })
+            })?;
+        if let (Some(panels), SymbolicCholeskyRaw::Supernodal(raw)) = (&mut self.panels, self.symbolic.raw()) {
+            panels.take(raw, &self.factor);
+        }
+        Ok(())
     }
 
     fn solve(&mut self, b: &mut [Vec3]) {
+        // Single precision has fewer powers of ten than forces may span.
+        let scale = b.iter().flat_map(|b| b.iter()).fold(f64::MIN_POSITIVE, |scale, b| scale.max(b.abs()));
+        let (Some(panels), Some(order), true) = (&mut self.panels, self.symbolic.perm(), scale.is_finite()) else {
+            return self.solve_in_double(b);
+        };
+        let (old, new) = order.arrays();
+        let x = panels.solve(|rhs| {
+            for (rhs, &old) in rhs.iter_mut().zip(old) {
+                *rhs = (b[old as usize / 3][old as usize % 3] / scale) as f32;
+            }
+        });
+        for (b, new) in b.iter_mut().zip(new.as_chunks::<3>().0) {
+            *b = Vec3::from_fn(|c, _| scale * f64::from(x[new[c] as usize]));
+        }
+    }
+
+    fn solve_in_double(&mut self, b: &mut [Vec3]) {
         for (to, from) in self.rhs.chunks_exact_mut(3).zip(&*b) {
             to.copy_from_slice(from.as_slice());
         }
@@ -147,29 +182,54 @@ mod tests {
     use super::*;
     use crate::math::Mat3;
 
-    #[test]
-    fn solves_a_random_block_system() {
-        let n = 40;
-        let edges = (1..n as u32).flat_map(|i| [(i, i - 1), (i, i / 3)]);
+    fn random_block_system(n: usize) -> BlockMatrix {
+        let edges = (1..n as u32).flat_map(|i| [(i, i - 1), (i, i / 3), (i, 31 % i)]);
         let mut A = BlockMatrix::zeros(Pattern::new(n, edges));
         for j in 0..n {
             for k in A.pattern.start[j] as usize..A.pattern.start[j + 1] as usize {
                 let noise = Mat3::from_fn(|r, c| ((7 * k + 3 * r + c) as f64).sin());
                 A.blocks[k] = if A.pattern.row[k] as usize == j {
-                    noise + noise.transpose() + 20.0 * Mat3::identity()
+                    noise + noise.transpose() + 60.0 * Mat3::identity()
                 } else {
                     noise
                 };
             }
         }
+        A
+    }
+
+    #[test]
+    fn solves_a_random_block_system() {
+        let n = 40;
+        let mut A = random_block_system(n);
         let x: Vec<Vec3> = (0..n).map(|i| Vec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
         let mut b = vec![Vec3::zeros(); n];
         A.multiply(&x, &mut b);
-        let mut solver = Cholesky::analyse(&A.pattern).expect("a small system");
+        let mut solver = Cholesky::analyse(&A.pattern, Precision::Double).expect("a small system");
         solver.factor(&A).expect("diagonally dominant");
         solver.solve(&mut b);
         assert!(x.iter().zip(&b).all(|(x, b)| (x - b).norm() < 1e-10));
         A.blocks[0] = -Mat3::identity();
         assert!(solver.factor(&A).is_err());
+    }
+
+    #[test]
+    fn single_precision_is_good_to_six_digits_at_any_scale() {
+        for (n, scale) in [(5, 1.0), (40, 1e-60), (300, 1e60)] {
+            let A = random_block_system(n);
+            let x: Vec<Vec3> = (0..n).map(|i| scale * Vec3::new((i as f64).sin(), 1.0, -0.5)).collect();
+            let mut b = vec![Vec3::zeros(); n];
+            A.multiply(&x, &mut b);
+            let mut solver = Cholesky::analyse(&A.pattern, Precision::Single).expect("a small system");
+            solver.factor(&A).expect("diagonally dominant");
+            let mut again = b.clone();
+            solver.solve(&mut again);
+            assert!(x.iter().zip(&again).all(|(x, b)| (x - b).norm() < 1e-5 * scale));
+            solver.solve_in_double(&mut b);
+            assert!(x.iter().zip(&b).all(|(x, b)| (x - b).norm() < 1e-12 * scale));
+            let mut none = vec![Vec3::zeros(); n];
+            solver.solve(&mut none);
+            assert!(none.iter().all(|b| *b == Vec3::zeros()));
+        }
     }
 }

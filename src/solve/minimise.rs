@@ -8,7 +8,7 @@
 //! the approximate condition of Hager & Zhang, SIAM J. Optim. 16(1), 2005, where energy differences drown in round-off.
 
 use super::lbfgs::{Lbfgs, dot};
-use super::{Cholesky, LinearSolver, Problem, Rung, SolveError};
+use super::{Cholesky, LinearSolver, Precision, Problem, Rung, SolveError};
 use crate::fem::{Assembly, Configuration, Curvature};
 use crate::math::{Mat3, Vec3};
 
@@ -23,6 +23,8 @@ pub struct Strategy {
     pub tolerance: f64,
     /// Most linear solves in one minimisation.
     pub max_iterations: u32,
+    /// Precision of the linear solves.
+    pub precision: Precision,
     /// A rung that is left out, to be measured.
     pub without: Option<Rung>,
 }
@@ -87,7 +89,7 @@ impl Minimiser {
         let config =
             Configuration { x: problem.X.to_vec(), poses: vec![crate::math::Pose::REST; problem.pivots.len()] };
         Ok(Minimiser {
-            cholesky: Cholesky::analyse(&assembly.K.pattern)?,
+            cholesky: Cholesky::analyse(&assembly.K.pattern, strategy.precision)?,
             assembly,
             memory: Lbfgs::new(strategy.memory, n),
             strategy,
@@ -165,9 +167,9 @@ impl Minimiser {
         Ok(())
     }
 
-    /// `d <- K^-1 d` with the factor at hand.
+    /// `d <- K^-1 d` with the factor at hand, in double precision.
     pub fn apply_inverse(&mut self, d: &mut [Vec3]) {
-        self.cholesky.solve(d);
+        self.cholesky.solve_in_double(d);
     }
 
     /// Moves `config` to where the factor at hand expects the equilibrium once the prescribed nodes have gone by `u`:
@@ -224,6 +226,9 @@ impl Minimiser {
                 self.memory.forget();
                 slope = self.direction();
                 outcome.iterations += 1;
+            }
+            if !slope.is_finite() {
+                return Err(SolveError::NotFinite);
             }
             outcome.correction = problem.dofs.largest_motion(&self.d, config, problem.pivots);
             let last = outcome.correction <= self.strategy.tolerance;

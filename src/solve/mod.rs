@@ -6,6 +6,7 @@ mod cholesky;
 mod lbfgs;
 mod minimise;
 mod ordering;
+mod panels;
 mod problem;
 mod rung;
 
@@ -81,6 +82,15 @@ impl SolveError {
     }
 }
 
+/// Precision of the solves with a kept factor; residuals and the factor itself are always in double precision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// Half the memory traffic and so about half the time; enough for directions of descent.
+    Single,
+    /// To the last digits that the condition of the stiffness leaves.
+    Double,
+}
+
 /// A solver for symmetric positive definite systems of 3x3 blocks.
 pub trait LinearSolver {
     /// Takes new numbers on the known pattern.
@@ -89,6 +99,9 @@ pub trait LinearSolver {
     /// The block at which the matrix is found not to be positive definite.
     fn factor(&mut self, A: &crate::fem::BlockMatrix) -> Result<(), usize>;
 
-    /// Replaces the right-hand side `b` by the solution; allocates nothing.
+    /// Replaces the right-hand side `b` by the solution, good to the solver's [`Precision`]; allocates nothing.
     fn solve(&mut self, b: &mut [crate::math::Vec3]);
+
+    /// The same, always in double precision.
+    fn solve_in_double(&mut self, b: &mut [crate::math::Vec3]);
 }

@@ -15,7 +15,7 @@ use cutis::fem::{At, Configuration, Curvature, Dofs, EDGES, Elastic, HessianSink
 use cutis::geometry::{Block, Pattern, block};
 use cutis::math::{Mat3, Vec3, vec9};
 use cutis::mesh::TetMesh;
-use cutis::solve::{Minimiser, Problem, Strategy};
+use cutis::solve::{Minimiser, Precision, Problem, Strategy};
 
 /// A measured rate may lie this far below the theory's on these meshes, which are not yet fine.
 const SLACK: f64 = 0.1;
@@ -149,7 +149,14 @@ fn errors<M: Energy + 'static>(law: fn() -> M, force: f64, order: u32, n: usize)
     let terms: Vec<Box<dyn Term>> = vec![elements.of(Elastic(law())), Box::new(BodyForce(f))];
     let at = At::NOWHERE;
     let problem = Problem { terms: &terms, dofs: &dofs, X: &mesh.nodes, pivots: &[], wrenches: &[], at };
-    let newton = Strategy { memory: 0, refresh_after: 1, tolerance: 1e-10, max_iterations: 50, without: None };
+    let newton = Strategy {
+        memory: 0,
+        refresh_after: 1,
+        tolerance: 1e-10,
+        max_iterations: 50,
+        precision: Precision::Double,
+        without: None,
+    };
     // The start is the motion at the nodes, where every law is defined; the equilibrium is near it and elsewhere.
     let x = mesh.nodes.iter().map(|X| X + u(X)).collect();
     let mut config = Configuration { x, poses: Vec::new() };
