@@ -68,11 +68,22 @@ impl Kernel<2> for Springs {
         let (.., stretch) = self.state(e, x);
         0.5 * self.0[e].k * stretch * stretch
     }
-    fn gradient(&self, at: &At, e: usize, x: &[Vec3; 2], g: &mut [Vec3; 2]) -> f64 {
-        let (_, n, stretch) = self.state(e, x);
-        let f = self.0[e].k * stretch * n;
-        *g = [-f, f];
-        self.energy(at, e, x)
+    fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
+        let mut energy = 0.0;
+        for (e, spring) in self.0.iter().enumerate() {
+            let ends = spring.ends.map(|a| a as usize);
+            let x = ends.map(|a| x[a]);
+            let (_, n, stretch) = self.state(e, &x);
+            let f = spring.k * stretch * n;
+            g[ends[0]] -= f;
+            g[ends[1]] += f;
+            energy += self.energy(at, e, &x);
+        }
+        energy
+    }
+    fn min_det_f(&self, x: &[Vec3]) -> f64 {
+        let stretch = |(e, spring): (usize, &Spring)| self.state(e, &spring.ends.map(|a| x[a as usize])).0 / spring.L;
+        self.0.iter().enumerate().map(stretch).fold(f64::INFINITY, f64::min)
     }
     fn hessian(&self, _at: &At, e: usize, x: &[Vec3; 2], curvature: Curvature, upper: &mut [Mat3]) {
         let (l, n, stretch) = self.state(e, x);

@@ -8,21 +8,39 @@
 //! It is not objective: a rotation costs energy. Use it for small motion.
 
 use super::{Energy, Lame};
-use crate::math::{Mat3, Mat9, outer};
+use crate::math::lane::{Lane, Real, Tensor, norm_squared, tensor, trace};
+use crate::math::{Mat3, Mat9, entries, mat3, outer};
 
 /// Linear elasticity with Lame's constants, Pa.
 pub struct Linear(pub Lame);
+
+impl Linear {
+    #[inline(always)]
+    fn formula<T: Real>(&self, F: &Tensor<T>) -> (T, Tensor<T>) {
+        let Lame { mu, lambda } = self.0;
+        let eps = tensor(|i, j| if i == j { F[i][i] - 1.0 } else { (F[i][j] + F[j][i]) * 0.5 });
+        let pressure = trace(&eps) * lambda;
+        let psi = norm_squared(&eps) * mu + pressure * trace(&eps) * 0.5;
+        (psi, tensor(|i, j| if i == j { eps[i][i] * (2.0 * mu) + pressure } else { eps[i][j] * (2.0 * mu) }))
+    }
+}
 
 impl Energy for Linear {
     const NAME: &'static str = "linear";
 
     fn psi(&self, F: &Mat3) -> f64 {
-        let eps = 0.5 * (F + F.transpose()) - Mat3::identity();
-        self.0.mu * eps.norm_squared() + 0.5 * self.0.lambda * eps.trace().powi(2)
+        self.formula(&entries(F)).0
     }
     fn P(&self, F: &Mat3) -> Mat3 {
-        let eps = 0.5 * (F + F.transpose()) - Mat3::identity();
-        2.0 * self.0.mu * eps + self.0.lambda * eps.trace() * Mat3::identity()
+        mat3(&self.formula(&entries(F)).1)
+    }
+    fn psi_and_P(&self, F: &Mat3) -> (f64, Mat3) {
+        let (psi, P) = self.formula(&entries(F));
+        (psi, mat3(&P))
+    }
+    #[inline(always)]
+    fn psi_and_P_in<S: pulp::Simd>(&self, _: S, F: &Tensor<Lane<S>>) -> (Lane<S>, Tensor<Lane<S>>) {
+        self.formula(F)
     }
     fn dPdF(&self, _F: &Mat3) -> Mat9 {
         let I = Mat3::identity();

@@ -30,6 +30,9 @@ pub use strain_limit::StrainLimit;
 pub use veronda_westmann::VerondaWestmann;
 pub use yeoh::Yeoh;
 
+use pulp::Simd;
+
+use crate::math::lane::{BATCH, Lane, Tensor, tensor};
 use crate::math::{Mat3, Mat9};
 
 /// A strain energy density psi(F), J/m3, with its first two derivatives.
@@ -44,8 +47,41 @@ pub trait Energy: Send + Sync {
     fn psi_and_P(&self, F: &Mat3) -> (f64, Mat3) {
         (self.psi(F), self.P(F))
     }
+    /// Both in many points at once; psi may be NaN where the law is not defined. Laws that are formulas over any numbers
+    /// say so here, all others are evaluated point by point.
+    #[inline(always)]
+    fn psi_and_P_in<S: Simd>(&self, simd: S, F: &Tensor<Lane<S>>) -> (Lane<S>, Tensor<Lane<S>>)
+    where
+        Self: Sized,
+    {
+        lane_by_lane(simd, F, |_, F| self.psi_and_P(F))
+    }
     /// Tangent d2 psi / dF2 over `vec(F)`, Pa.
     fn dPdF(&self, F: &Mat3) -> Mat9;
+}
+
+/// `psi_and_P` of each lane and its F.
+#[inline(always)]
+pub fn lane_by_lane<S: Simd>(
+    simd: S,
+    F: &Tensor<Lane<S>>,
+    psi_and_P: impl Fn(usize, &Mat3) -> (f64, Mat3),
+) -> (Lane<S>, Tensor<Lane<S>>) {
+    let mut entries = [[[0.0; BATCH]; 3]; 3];
+    let mut psi = [0.0; BATCH];
+    for (to, from) in entries.as_flattened_mut().iter_mut().zip(F.as_flattened()) {
+        from.store(to, 0);
+    }
+    for lane in 0..S::F64_LANES {
+        let (psi_l, P) = psi_and_P(lane, &Mat3::from_fn(|i, j| entries[i][j][lane]));
+        psi[lane] = psi_l;
+        for i in 0..3 {
+            for j in 0..3 {
+                entries[i][j][lane] = P[(i, j)];
+            }
+        }
+    }
+    (Lane::load(simd, &psi, 0), tensor(|i, j| Lane::load(simd, &entries[i][j], 0)))
 }
 
 /// Lame's constants, Pa.

@@ -8,15 +8,31 @@
 //! It softens under compression (no convexity below a stretch of about 0.58): for moderate strain only.
 
 use super::{Energy, Lame};
-use crate::math::{Mat3, Mat9, outer};
+use crate::math::lane::{Lane, Real, Tensor, dot3, norm_squared, tensor, trace};
+use crate::math::{Mat3, Mat9, entries, mat3, outer};
 
 /// St. Venant-Kirchhoff tissue with Lame's constants, Pa.
 pub struct StVenantKirchhoff(pub Lame);
 
 impl StVenantKirchhoff {
-    fn S(&self, F: &Mat3) -> Mat3 {
-        let E = 0.5 * (F.transpose() * F - Mat3::identity());
-        2.0 * self.0.mu * E + self.0.lambda * E.trace() * Mat3::identity()
+    /// The energy density and S, Pa.
+    #[inline(always)]
+    fn psi_and_S<T: Real>(&self, F: &Tensor<T>) -> (T, Tensor<T>) {
+        let Lame { mu, lambda } = self.0;
+        let column = |j: usize| [F[0][j], F[1][j], F[2][j]];
+        let E = tensor(|i, j| {
+            let C = dot3(&column(i), &column(j));
+            (if i == j { C - 1.0 } else { C }) * 0.5
+        });
+        let pressure = trace(&E) * lambda;
+        let psi = norm_squared(&E) * mu + pressure * trace(&E) * 0.5;
+        (psi, tensor(|i, j| if i == j { E[i][i] * (2.0 * mu) + pressure } else { E[i][j] * (2.0 * mu) }))
+    }
+
+    #[inline(always)]
+    fn formula<T: Real>(&self, F: &Tensor<T>) -> (T, Tensor<T>) {
+        let (psi, S) = self.psi_and_S(F);
+        (psi, tensor(|i, j| dot3(&F[i], &S[j])))
     }
 }
 
@@ -24,15 +40,22 @@ impl Energy for StVenantKirchhoff {
     const NAME: &'static str = "st-venant-kirchhoff";
 
     fn psi(&self, F: &Mat3) -> f64 {
-        let E = 0.5 * (F.transpose() * F - Mat3::identity());
-        self.0.mu * E.norm_squared() + 0.5 * self.0.lambda * E.trace().powi(2)
+        self.formula(&entries(F)).0
     }
     fn P(&self, F: &Mat3) -> Mat3 {
-        F * self.S(F)
+        mat3(&self.formula(&entries(F)).1)
+    }
+    fn psi_and_P(&self, F: &Mat3) -> (f64, Mat3) {
+        let (psi, P) = self.formula(&entries(F));
+        (psi, mat3(&P))
+    }
+    #[inline(always)]
+    fn psi_and_P_in<S: pulp::Simd>(&self, _: S, F: &Tensor<Lane<S>>) -> (Lane<S>, Tensor<Lane<S>>) {
+        self.formula(F)
     }
     fn dPdF(&self, F: &Mat3) -> Mat9 {
         // dP_ij/dF_kl = d_ik S_jl + mu (F_il F_kj + (F F^T)_ik d_jl) + lambda F_ij F_kl
-        let S = self.S(F);
+        let S = mat3(&self.psi_and_S(&entries(F)).1);
         let B = F * F.transpose();
         let mut H = self.0.lambda * outer(F, F);
         for j in 0..3 {

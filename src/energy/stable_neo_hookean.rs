@@ -9,14 +9,25 @@
 //! agree with `Linear`; the constant is chosen so that psi(I) = 0.
 
 use super::{Energy, Lame};
-use crate::math::{Mat3, Mat9, cofactor, d2JdF2, outer};
+use crate::math::lane::{Lane, Real, Tensor, cofactors, det, norm_squared, tensor};
+use crate::math::{Mat3, Mat9, cofactor, d2JdF2, entries, mat3, outer};
 
 /// Stable neo-Hookean tissue with the Lame constants of its small strains, Pa.
 pub struct StableNeoHookean(pub Lame);
 
 impl StableNeoHookean {
-    fn dpsi_dJ(&self, J: f64) -> f64 {
-        (self.0.lambda + self.0.mu) * (J - 1.0) - self.0.mu
+    fn dpsi_dJ<T: Real>(&self, J: T) -> T {
+        (J - 1.0) * (self.0.lambda + self.0.mu) - self.0.mu
+    }
+
+    #[inline(always)]
+    fn formula<T: Real>(&self, F: &Tensor<T>) -> (T, Tensor<T>) {
+        let Lame { mu, lambda } = self.0;
+        let g = cofactors(F);
+        let j = det(F, &g) - 1.0;
+        let slope = self.dpsi_dJ(j + 1.0);
+        let psi = (norm_squared(F) - 3.0) * (0.5 * mu) - j * mu + j * j * (0.5 * (lambda + mu));
+        (psi, tensor(|i, k| slope.mul_add(g[i][k], F[i][k] * mu)))
     }
 }
 
@@ -24,12 +35,18 @@ impl Energy for StableNeoHookean {
     const NAME: &'static str = "stable-neo-hookean";
 
     fn psi(&self, F: &Mat3) -> f64 {
-        let Lame { mu, lambda } = self.0;
-        let j = F.determinant() - 1.0;
-        0.5 * mu * (F.norm_squared() - 3.0) - mu * j + 0.5 * (lambda + mu) * j * j
+        self.formula(&entries(F)).0
     }
     fn P(&self, F: &Mat3) -> Mat3 {
-        self.0.mu * F + self.dpsi_dJ(F.determinant()) * cofactor(F)
+        mat3(&self.formula(&entries(F)).1)
+    }
+    fn psi_and_P(&self, F: &Mat3) -> (f64, Mat3) {
+        let (psi, P) = self.formula(&entries(F));
+        (psi, mat3(&P))
+    }
+    #[inline(always)]
+    fn psi_and_P_in<S: pulp::Simd>(&self, _: S, F: &Tensor<Lane<S>>) -> (Lane<S>, Tensor<Lane<S>>) {
+        self.formula(F)
     }
     fn dPdF(&self, F: &Mat3) -> Mat9 {
         let g = cofactor(F);

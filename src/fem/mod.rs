@@ -3,6 +3,7 @@
 #![allow(non_snake_case)]
 
 mod assemble;
+mod batch;
 mod curved;
 mod difference;
 mod dofs;

@@ -6,8 +6,12 @@
 //!
 //! Source: Bonet & Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", 2nd ed., 2008, chapter 9.
 
+use pulp::Simd;
+
+use super::batch::{AddGradient, MinDetF, Points};
 use super::{At, Curvature, Kernel, Strain};
-use crate::energy::Energy;
+use crate::energy::{Energy, lane_by_lane};
+use crate::math::lane::{Lane, Tensor};
 use crate::math::{Mat3, Mat9, Vec3, clamp_eigenvalues};
 
 /// What stands at a point of integration: a law that may know the point (its fibre, its past) and the inputs.
@@ -18,6 +22,20 @@ pub trait Material: Send + Sync {
     fn psi(&self, at: &At, p: usize, F: &Mat3) -> f64;
     /// Energy density and first Piola-Kirchhoff stress (Pa).
     fn psi_and_P(&self, at: &At, p: usize, F: &Mat3) -> (f64, Mat3);
+    /// Both in many points at once, `point` by lane; psi may be NaN where the law is not defined.
+    #[inline(always)]
+    fn psi_and_P_in<S: Simd>(
+        &self,
+        simd: S,
+        at: &At,
+        point: impl Fn(usize) -> usize,
+        F: &Tensor<Lane<S>>,
+    ) -> (Lane<S>, Tensor<Lane<S>>)
+    where
+        Self: Sized,
+    {
+        lane_by_lane(simd, F, |lane, F| self.psi_and_P(at, point(lane), F))
+    }
     /// Tangent over `vec(F)`, Pa.
     fn dPdF(&self, at: &At, p: usize, F: &Mat3) -> Mat9;
     /// Whether its tangent is the same at every F.
@@ -76,6 +94,16 @@ impl<M: Energy> Material for Elastic<M> {
     fn psi_and_P(&self, _at: &At, _p: usize, F: &Mat3) -> (f64, Mat3) {
         self.0.psi_and_P(F)
     }
+    #[inline(always)]
+    fn psi_and_P_in<S: Simd>(
+        &self,
+        simd: S,
+        _at: &At,
+        _point: impl Fn(usize) -> usize,
+        F: &Tensor<Lane<S>>,
+    ) -> (Lane<S>, Tensor<Lane<S>>) {
+        self.0.psi_and_P_in(simd, F)
+    }
     fn dPdF(&self, _at: &At, _p: usize, F: &Mat3) -> Mat9 {
         self.0.dPdF(F)
     }
@@ -94,9 +122,9 @@ pub struct Point<const N: usize> {
 
 /// Elements with N nodes and Q points of one material. Point `p = Q e + q`.
 pub struct Solid<M, const N: usize, const Q: usize> {
-    material: M,
-    nodes: Vec<[u32; N]>,
-    points: Vec<[Point<N>; Q]>,
+    pub(super) material: M,
+    pub(super) nodes: Vec<[u32; N]>,
+    pub(super) points: Points<N, Q>,
 }
 
 impl<M: Material, const N: usize, const Q: usize> Solid<M, N, Q> {
@@ -108,7 +136,7 @@ impl<M: Material, const N: usize, const Q: usize> Solid<M, N, Q> {
         points: fn(&[Vec3; N]) -> [Point<N>; Q],
     ) -> Self {
         let nodes: Vec<[u32; N]> = elements.collect();
-        let points = nodes.iter().map(|n| points(&n.map(|a| X[a as usize]))).collect();
+        let points = Points::new(nodes.iter().map(|n| points(&n.map(|a| X[a as usize]))));
         Solid { material, nodes, points }
     }
 }
@@ -136,24 +164,17 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
     fn energy(&self, at: &At, e: usize, x: &[Vec3; N]) -> f64 {
         let psi =
             |(q, point): (usize, &Point<N>)| point.w * self.material.psi(at, Q * e + q, &deformation(&point.dN, x));
-        self.points[e].iter().enumerate().map(psi).sum()
+        self.points.of(e).iter().enumerate().map(psi).sum()
     }
-    fn gradient(&self, at: &At, e: usize, x: &[Vec3; N], g: &mut [Vec3; N]) -> f64 {
-        let mut energy = 0.0;
-        for (q, point) in self.points[e].iter().enumerate() {
-            let (psi, P) = self.material.psi_and_P(at, Q * e + q, &deformation(&point.dN, x));
-            energy += point.w * psi;
-            let wP = point.w * P;
-            for (g, dN) in g.iter_mut().zip(&point.dN) {
-                let share = wP * dN;
-                *g = if q == 0 { share } else { *g + share };
-            }
-        }
-        energy
+    fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
+        AddGradient { solid: self, at, x, g }.run()
+    }
+    fn min_det_f(&self, x: &[Vec3]) -> f64 {
+        if self.material.is_elastic() { MinDetF { solid: self, x }.run() } else { f64::INFINITY }
     }
     fn hessian(&self, at: &At, e: usize, x: &[Vec3; N], curvature: Curvature, upper: &mut [Mat3]) {
         upper.fill(Mat3::zeros());
-        for (q, point) in self.points[e].iter().enumerate() {
+        for (q, point) in self.points.of(e).iter().enumerate() {
             let mut H = self.material.dPdF(at, Q * e + q, &deformation(&point.dN, x));
             if curvature == Curvature::Projected {
                 H = clamp_eigenvalues(&H);
@@ -174,7 +195,7 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
         if !self.material.is_elastic() {
             return Strain::NONE;
         }
-        self.points[e].iter().enumerate().fold(Strain::NONE, |s, (q, point)| {
+        self.points.of(e).iter().enumerate().fold(Strain::NONE, |s, (q, point)| {
             let F = deformation(&point.dN, x);
             s.and(Strain {
                 min_det_f: F.determinant(),
@@ -190,7 +211,7 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
         self.material.remembers()
     }
     fn commit(&self, at: &At, e: usize, x: &[Vec3; N], history: &mut [f64]) {
-        for (q, point) in self.points[e].iter().enumerate() {
+        for (q, point) in self.points.of(e).iter().enumerate() {
             self.material.commit(at, Q * e + q, &deformation(&point.dN, x), history);
         }
     }

@@ -1,4 +1,4 @@
-//! Terms: the summands of the energy that a step minimises, and the crate's only gather/scatter loop.
+//! Terms: the summands of the energy that a step minimises, and their sums over elements.
 
 use super::Difference;
 use crate::math::{Mat3, Vec3};
@@ -108,6 +108,11 @@ pub trait Term: Send + Sync {
         false
     }
 
+    /// Smallest det F at `x`, for terms that have solid elements.
+    fn min_det_f(&self, _x: &[Vec3]) -> f64 {
+        f64::INFINITY
+    }
+
     /// Strain at `x`, for terms that have elements.
     fn strain(&self, _at: &At, _x: &[Vec3]) -> Strain {
         Strain::NONE
@@ -136,8 +141,12 @@ pub trait Kernel<const N: usize>: Send + Sync {
     fn nodes(&self, e: usize) -> [u32; N];
     /// Energy of element `e`, J.
     fn energy(&self, at: &At, e: usize, x: &[Vec3; N]) -> f64;
-    /// Energy (J) and gradient (N) of element `e`.
-    fn gradient(&self, at: &At, e: usize, x: &[Vec3; N], g: &mut [Vec3; N]) -> f64;
+    /// Adds the gradient of all elements (N) and returns the energy (J), element after element.
+    fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64;
+    /// Smallest det F of all elements.
+    fn min_det_f(&self, _x: &[Vec3]) -> f64 {
+        f64::INFINITY
+    }
     /// Upper triangle of Hessian blocks of element `e`, row by row, N/m.
     fn hessian(&self, at: &At, e: usize, x: &[Vec3; N], curvature: Curvature, upper: &mut [Mat3]);
     /// Strain of element `e`.
@@ -175,16 +184,11 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
     }
 
     fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
-        let mut sum = 0.0;
-        let mut local = [Vec3::zeros(); N];
-        for e in 0..self.0.len() {
-            let (nodes, x) = self.gather(e, x);
-            sum += self.0.gradient(at, e, &x, &mut local);
-            for (a, g_a) in nodes.iter().zip(&local) {
-                g[*a as usize] += g_a;
-            }
-        }
-        sum
+        self.0.add_gradient(at, x, g)
+    }
+
+    fn min_det_f(&self, x: &[Vec3]) -> f64 {
+        self.0.min_det_f(x)
     }
 
     fn couplings(&self, clique: &mut dyn FnMut(&[u32])) {

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case)]
 
+pub mod lane;
 mod pose;
 mod psd;
 mod svd;
@@ -13,6 +14,18 @@ pub use psd::clamp_eigenvalues;
 pub use svd::{Svd, polar, svd};
 pub use tensor::{cofactor, d2JdF2, outer, skew, vec9};
 pub use triangle::nearest_weights;
+
+/// [`Mat3`] as a [`lane::Tensor`].
+#[inline(always)]
+pub fn entries(F: &Mat3) -> lane::Tensor<f64> {
+    lane::tensor(|i, j| F[(i, j)])
+}
+
+/// A [`lane::Tensor`] as [`Mat3`].
+#[inline(always)]
+pub fn mat3(F: &lane::Tensor<f64>) -> Mat3 {
+    Mat3::from_fn(|i, j| F[i][j])
+}
 
 /// A point or vector in space, m.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -39,10 +39,10 @@ impl Sim {
             Slot::BonePoseTranslation => rows(|k| self.state.config.poses[k].t, offset, out),
             Slot::BonePoseRotation => rows(|k| log_rotation(&self.state.config.poses[k].R), offset, out),
             Slot::SolverResidual => out.fill(o.residual),
-            Slot::EnergyElastic => out.fill(o.elastic),
+            Slot::EnergyElastic => out.fill(self.strain().energy),
             Slot::EnergyKinetic => out.fill(o.kinetic),
-            Slot::MinDetF => out.fill(o.min_det_f),
-            Slot::MaxStretch => out.fill(o.max_stretch),
+            Slot::MinDetF => out.fill(self.strain().min_det_f),
+            Slot::MaxStretch => out.fill(self.strain().max_stretch),
             input => {
                 let first = self.model.parts().layout.first(input).expect("every other port is an input") + offset;
                 out.copy_from_slice(&self.state.inputs[first..first + out.len()]);

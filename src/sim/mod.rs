@@ -22,8 +22,9 @@ pub use skin::Skin;
 pub use state::{State, StateError};
 pub use step::StepReport;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
+use crate::fem::Strain;
 use crate::solve::SolveError;
 
 /// Steps (s) outside of these make squares of dt overflow.
@@ -142,6 +143,8 @@ pub struct Sim {
     model: Arc<Model>,
     state: State,
     work: step::Workspace,
+    /// Strain of the accepted state, once somebody asked for it.
+    strain: OnceLock<Strain>,
     /// Made when the first derivative is asked for.
     sensitivity: Option<Box<derivative::Sensitivity>>,
 }
@@ -154,7 +157,7 @@ impl Sim {
     pub fn new(model: Arc<Model>) -> Result<Sim, SimError> {
         let state = State::start(&model);
         let work = step::Workspace::new(&model)?;
-        Ok(Sim { model, state, work, sensitivity: None })
+        Ok(Sim { model, state, work, strain: OnceLock::new(), sensitivity: None })
     }
 
     /// The model it moves.
@@ -182,6 +185,7 @@ impl Sim {
         state.inputs.copy_from_slice(&self.state.inputs);
         let report = step::initialise(&self.model, &mut state, &mut self.work)?;
         self.state = state;
+        self.strain.take();
         Ok(report)
     }
 
@@ -210,7 +214,17 @@ impl Sim {
         if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
             return Err(SimError::StepLength(dt));
         }
-        step::advance(&self.model, &mut self.state, &mut self.work, dt)
+        let report = step::advance(&self.model, &mut self.state, &mut self.work, dt)?;
+        self.strain.take();
+        Ok(report)
+    }
+
+    /// How much the elements were strained by the last accepted step; found when first asked for.
+    pub fn strain(&self) -> Strain {
+        if !self.state.outputs.converged {
+            return Strain { min_det_f: 1.0, max_stretch: 1.0, energy: 0.0 };
+        }
+        *self.strain.get_or_init(|| step::strain(&self.model, &self.state))
     }
 
     /// A snapshot: time, positions, velocities, inputs, outputs and what the solver remembers.
@@ -227,6 +241,7 @@ impl Sim {
             return Err(SimError::ForeignState { found: state.config.x.len(), wanted: self.model.mesh().nodes.len() });
         }
         self.state.clone_from(state);
+        self.strain.take();
         Ok(())
     }
 
@@ -243,6 +258,7 @@ impl Sim {
         if let Some((node, x)) = x.iter().enumerate().find(|(_, x)| !x.iter().all(|c| c.is_finite())) {
             return Err(SimError::StartNotFinite { node, x: x.x, y: x.y, z: x.z });
         }
+        self.strain();
         for &a in &self.model.dofs().free {
             self.state.config.x[a as usize] = x[a as usize];
         }
@@ -255,6 +271,7 @@ impl Sim {
     /// As after [`Sim::new`].
     pub fn reset(&mut self) {
         self.state = State::start(&self.model);
+        self.strain.take();
     }
 
     /// The solver's current positions, m, by node of the mesh.

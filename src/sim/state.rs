@@ -32,10 +32,9 @@ pub(super) struct Outputs {
     pub iterations: u32,
     pub residual: f64,
     pub converged: bool,
-    pub elastic: f64,
     pub kinetic: f64,
-    pub min_det_f: f64,
-    pub max_stretch: f64,
+    /// Length of the step, s.
+    pub dt: f64,
 }
 
 /// A snapshot of a simulation.
@@ -96,7 +95,7 @@ pub enum StateError {
 }
 
 const MAGIC: &[u8; 8] = b"cutis-st";
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 impl State {
     /// At rest, t = 0, inputs at their start values.
@@ -117,10 +116,8 @@ impl State {
                 iterations: 0,
                 residual: 0.0,
                 converged: false,
-                elastic: 0.0,
                 kinetic: 0.0,
-                min_det_f: 1.0,
-                max_stretch: 1.0,
+                dt: 0.0,
             },
         }
     }
@@ -154,7 +151,7 @@ impl State {
         put_vectors(&mut body, &o.reaction_torque);
         body.u32(o.iterations);
         body.u32(u32::from(o.converged));
-        body.f64s([o.residual, o.elastic, o.kinetic, o.min_det_f, o.max_stretch].into_iter());
+        [o.residual, o.kinetic, o.dt].into_iter().for_each(|v| body.f64(v));
         body.u32(u32::from(self.linearisation.is_some()));
         if let Some(l) = &self.linearisation {
             put_config(&mut body, &l.config);
@@ -209,7 +206,7 @@ impl State {
         let reaction_force = take_vectors(&mut r, "reactions", n_bones)?;
         let reaction_torque = take_vectors(&mut r, "reactions", n_bones)?;
         let (iterations, converged) = (r.u32()?, r.u32()? != 0);
-        let scalars = take_f64s(&mut r, "diagnostics", 5)?;
+        let [residual, kinetic, dt] = [r.f64()?, r.f64()?, r.f64()?];
         let linearisation = match r.u32()? {
             0 => None,
             _ => Some(Arc::new(Linearisation {
@@ -222,20 +219,7 @@ impl State {
                 x_tilde: take_vectors(&mut r, "inertial predictions", motion.v.len())?,
             })),
         };
-        let [residual, elastic, kinetic, min_det_f, max_stretch] = scalars[..] else {
-            return Err(StateError::Length { what: "diagnostics", found: scalars.len(), wanted: 5 });
-        };
-        let outputs = Outputs {
-            reaction_force,
-            reaction_torque,
-            iterations,
-            residual,
-            converged,
-            elastic,
-            kinetic,
-            min_det_f,
-            max_stretch,
-        };
+        let outputs = Outputs { reaction_force, reaction_torque, iterations, residual, converged, kinetic, dt };
         Ok(State { t, config, motion, history, inputs, applied, linearisation, outputs })
     }
 }

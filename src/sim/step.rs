@@ -54,12 +54,6 @@ pub struct StepReport {
     pub correction: f64,
     /// Whether the tolerance was met.
     pub converged: bool,
-    /// Smallest det F.
-    pub min_det_f: f64,
-    /// Largest principal stretch.
-    pub max_stretch: f64,
-    /// Strain energy, J.
-    pub elastic: f64,
     /// What the user should know about this step; empty as a rule.
     pub warnings: Vec<String>,
 }
@@ -219,10 +213,9 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
             }
         }
     }
-    let at = At { t: state.t + dt, dt, inputs: &work.inputs, history: &work.history, ..At::NOWHERE };
-    let strain = strain_of(model, &at, &work.config.x);
-    if strain.min_det_f <= 0.0 && state.outputs.min_det_f > 0.0 {
-        report.warnings.push(format!("elements are turned inside out (smallest det F {:.3})", strain.min_det_f));
+    let smallest = min_det_f(model, &work.config.x);
+    if smallest <= 0.0 && min_det_f(model, &state.config.x) > 0.0 {
+        report.warnings.push(format!("elements are turned inside out (smallest det F {smallest:.3})"));
     }
     if let Some(pace) = pace.filter(|pace| !pace.holds(report.time_error)) {
         report.warnings.push(pace.broken(report.time_error));
@@ -234,11 +227,8 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     state.history.copy_from_slice(&work.history);
     state.applied.copy_from_slice(&work.inputs);
     state.linearisation = linearisation;
-    report.min_det_f = strain.min_det_f;
-    report.max_stretch = strain.max_stretch;
-    report.elastic = strain.energy;
     report.converged = true;
-    read_outputs(model, state, work, &report);
+    read_outputs(model, state, work, &report, dt);
     Ok(report)
 }
 
@@ -252,9 +242,6 @@ impl StepReport {
             residual: 0.0,
             correction: 0.0,
             converged: true,
-            min_det_f: 1.0,
-            max_stretch: 1.0,
-            elastic: 0.0,
             warnings: Vec::new(),
         }
     }
@@ -312,7 +299,7 @@ fn step_piece(
         wrenches,
     } = work;
     let at = At { t, dt, inputs, history, ..At::NOWHERE };
-    let is_inverted = |x: &[Vec3]| strain_of(model, &at, x).min_det_f <= 0.0;
+    let is_inverted = |x: &[Vec3]| min_det_f(model, x) <= 0.0;
     // A start that no step has led to may be tangled.
     let untangled =
         linearisation.is_none() && !model.is_quadratic() && strategy.has(Rung::StandIn) && is_inverted(&config.x);
@@ -490,8 +477,14 @@ fn move_along(prescribed: &[u32], config: &mut Configuration, u: &mut [Vec3]) {
     }
 }
 
-fn strain_of(model: &Model, at: &At, x: &[Vec3]) -> Strain {
-    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(at, x)))
+fn min_det_f(model: &Model, x: &[Vec3]) -> f64 {
+    model.parts().terms.iter().map(|t| t.min_det_f(x)).fold(f64::INFINITY, f64::min)
+}
+
+/// Strain and energy of an accepted state.
+pub(super) fn strain(model: &Model, state: &State) -> Strain {
+    let at = At { t: state.t, dt: state.outputs.dt, inputs: &state.applied, history: &state.history, ..At::NOWHERE };
+    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(&at, &state.config.x)))
 }
 
 fn input3(inputs: &[f64], first: Option<usize>, row: usize) -> Vec3 {
@@ -595,7 +588,7 @@ fn warn_of_jumps(model: &Model, before: &Configuration, after: &Configuration, r
 }
 
 /// Reactions, energies and diagnostics of the accepted step.
-fn read_outputs(model: &Model, state: &mut State, work: &Workspace, report: &StepReport) {
+fn read_outputs(model: &Model, state: &mut State, work: &Workspace, report: &StepReport, dt: f64) {
     let parts = model.parts();
     let g = work.minimiser.nodal_gradient();
     let o = &mut state.outputs;
@@ -613,9 +606,7 @@ fn read_outputs(model: &Model, state: &mut State, work: &Workspace, report: &Ste
     o.iterations = report.iterations;
     o.residual = report.residual;
     o.converged = report.converged;
-    o.elastic = report.elastic;
-    o.min_det_f = report.min_det_f;
-    o.max_stretch = report.max_stretch;
+    o.dt = dt;
     o.kinetic = parts.inertia.as_ref().map_or(0.0, |inertia| {
         0.5 * inertia.m.iter().zip(&state.motion.v).map(|(m, v)| m * v.norm_squared()).sum::<f64>()
     });
