@@ -18,10 +18,10 @@ impl Linear {
     #[inline(always)]
     fn formula<T: Real>(&self, F: &Tensor<T>) -> (T, Tensor<T>) {
         let Lame { mu, lambda } = self.0;
-        let eps = tensor(|i, j| if i == j { F[i][i] - 1.0 } else { (F[i][j] + F[j][i]) * 0.5 });
+        let eps = tensor!(|i, j| if i == j { F[i][i] - 1.0 } else { (F[i][j] + F[j][i]) * 0.5 });
         let pressure = trace(&eps) * lambda;
         let psi = norm_squared(&eps) * mu + pressure * trace(&eps) * 0.5;
-        (psi, tensor(|i, j| if i == j { eps[i][i] * (2.0 * mu) + pressure } else { eps[i][j] * (2.0 * mu) }))
+        (psi, tensor!(|i, j| if i == j { eps[i][i] * (2.0 * mu) + pressure } else { eps[i][j] * (2.0 * mu) }))
     }
 }
 

@@ -81,7 +81,7 @@ pub fn lane_by_lane<S: Simd>(
             }
         }
     }
-    (Lane::load(simd, &psi, 0), tensor(|i, j| Lane::load(simd, &entries[i][j], 0)))
+    (Lane::load(simd, &psi, 0), tensor!(|i, j| Lane::load(simd, &entries[i][j], 0)))
 }
 
 /// Lame's constants, Pa.

@@ -23,7 +23,7 @@ impl NeoHookean {
         let lnJ = J.map(f64::ln);
         let slope = (lnJ * lambda - mu) * J.map(f64::recip);
         let psi = (norm_squared(F) - 3.0) * (0.5 * mu) - lnJ * mu + lnJ * lnJ * (0.5 * lambda);
-        (psi, tensor(|i, k| slope.mul_add(g[i][k], F[i][k] * mu)))
+        (psi, tensor!(|i, k| slope.mul_add(g[i][k], F[i][k] * mu)))
     }
 }
 

@@ -20,19 +20,19 @@ impl StVenantKirchhoff {
     fn psi_and_S<T: Real>(&self, F: &Tensor<T>) -> (T, Tensor<T>) {
         let Lame { mu, lambda } = self.0;
         let column = |j: usize| [F[0][j], F[1][j], F[2][j]];
-        let E = tensor(|i, j| {
+        let E = tensor!(|i, j| {
             let C = dot3(&column(i), &column(j));
             (if i == j { C - 1.0 } else { C }) * 0.5
         });
         let pressure = trace(&E) * lambda;
         let psi = norm_squared(&E) * mu + pressure * trace(&E) * 0.5;
-        (psi, tensor(|i, j| if i == j { E[i][i] * (2.0 * mu) + pressure } else { E[i][j] * (2.0 * mu) }))
+        (psi, tensor!(|i, j| if i == j { E[i][i] * (2.0 * mu) + pressure } else { E[i][j] * (2.0 * mu) }))
     }
 
     #[inline(always)]
     fn formula<T: Real>(&self, F: &Tensor<T>) -> (T, Tensor<T>) {
         let (psi, S) = self.psi_and_S(F);
-        (psi, tensor(|i, j| dot3(&F[i], &S[j])))
+        (psi, tensor!(|i, j| dot3(&F[i], &S[j])))
     }
 }
 

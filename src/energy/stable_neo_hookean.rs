@@ -27,7 +27,7 @@ impl StableNeoHookean {
         let j = det(F, &g) - 1.0;
         let slope = self.dpsi_dJ(j + 1.0);
         let psi = (norm_squared(F) - 3.0) * (0.5 * mu) - j * mu + j * j * (0.5 * (lambda + mu));
-        (psi, tensor(|i, k| slope.mul_add(g[i][k], F[i][k] * mu)))
+        (psi, tensor!(|i, k| slope.mul_add(g[i][k], F[i][k] * mu)))
     }
 }
 

@@ -90,10 +90,10 @@ impl<'a, S: Simd, const N: usize, const Q: usize> Vector<'a, S, N, Q> {
     #[inline(always)]
     fn F(&self, q: usize) -> Tensor<Lane<S>> {
         let dN = self.dN(q, 1);
-        let mut F = tensor(|i, j| self.edges[1][i] * dN[j]);
+        let mut F = tensor!(|i, j| self.edges[1][i] * dN[j]);
         for a in 2..N {
             let dN = self.dN(q, a);
-            F = tensor(|i, j| self.edges[a][i].mul_add(dN[j], F[i][j]));
+            F = tensor!(|i, j| self.edges[a][i].mul_add(dN[j], F[i][j]));
         }
         F
     }
@@ -152,7 +152,7 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for AddGradient<'_, M
                     let (psi, P) = solid.material.psi_and_P_in(simd, at, point, &vector.F(q));
                     let w = vector.w(q);
                     energy = w.mul_add(psi, energy);
-                    let wP = tensor(|i, j| w * P[i][j]);
+                    let wP = tensor!(|i, j| w * P[i][j]);
                     for a in 1..N {
                         let dN = vector.dN(q, a);
                         for c in 0..3 {
@@ -210,5 +210,41 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for MinDetF<'_, M, N,
             }
         }
         least.least()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::energy::{Lame, NeoHookean};
+    use crate::fem::{Elastic, tet4_points};
+
+    #[test]
+    fn every_width_of_vectors_finds_the_same_forces() {
+        let mut random = (0_u32..).map(|k| 0.1 * (f64::from(k) * 12.9898).sin());
+        let mut noise = move || random.next().expect("endless");
+        let X: Vec<Vec3> = (0..4).map(|a| Vec3::ith(a.min(2), if a < 3 { 1.0 } else { 0.0 })).collect();
+        let X: Vec<Vec3> =
+            (0..11).flat_map(|_| X.iter().map(|X| X + Vec3::from_fn(|_, _| noise())).collect::<Vec<_>>()).collect();
+        // Eleven elements: one full batch and one that is filled up.
+        let nodes = (0..11_u32).map(|e| [4 * e + 3, 4 * e, 4 * e + 1, 4 * e + 2]);
+        let law = NeoHookean(Lame::new(15e3, 0.45));
+        let solid = Solid::new(Elastic(law), &X, nodes, tet4_points);
+        let x: Vec<Vec3> = X.iter().map(|X| X + Vec3::from_fn(|_, _| noise())).collect();
+        let forces = |run: &dyn Fn(AddGradient<Elastic<NeoHookean>, 4, 1>) -> f64| {
+            let mut g = vec![Vec3::zeros(); X.len()];
+            let energy = run(AddGradient { solid: &solid, at: &At::NOWHERE, x: &x, g: &mut g });
+            (energy, g)
+        };
+        let same = |(energy, g): (f64, Vec<Vec3>)| {
+            let (wanted, by_one) = forces(&|loop_| loop_.with_simd(pulp::Scalar::new()));
+            assert!((energy - wanted).abs() < 1e-12 * wanted.abs());
+            assert!(g.iter().zip(&by_one).all(|(g, one)| (g - one).norm() < 1e-9));
+        };
+        same(forces(&AddGradient::run));
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            same(forces(&|loop_| pulp::Simd::vectorize(simd, loop_)));
+        }
     }
 }

@@ -146,18 +146,62 @@ impl<S: Simd> Mul<f64> for Lane<S> {
 /// A 3x3 matrix of any numbers, by rows.
 pub type Tensor<T> = [[T; 3]; 3];
 
-/// A tensor by its entries.
-#[inline(always)]
-pub fn tensor<T>(entry: impl Fn(usize, usize) -> T) -> Tensor<T> {
-    let row = |i: usize| [entry(i, 0), entry(i, 1), entry(i, 2)];
-    [row(0), row(1), row(2)]
+/// A tensor by its entries, `tensor!(|i, j| ...)`. No closure: one that is not inlined does not know the machine's vectors.
+macro_rules! tensor {
+    (|$i:ident, $j:ident| $entry:expr) => {
+        [
+            [
+                {
+                    let ($i, $j) = (0, 0);
+                    $entry
+                },
+                {
+                    let ($i, $j) = (0, 1);
+                    $entry
+                },
+                {
+                    let ($i, $j) = (0, 2);
+                    $entry
+                },
+            ],
+            [
+                {
+                    let ($i, $j) = (1, 0);
+                    $entry
+                },
+                {
+                    let ($i, $j) = (1, 1);
+                    $entry
+                },
+                {
+                    let ($i, $j) = (1, 2);
+                    $entry
+                },
+            ],
+            [
+                {
+                    let ($i, $j) = (2, 0);
+                    $entry
+                },
+                {
+                    let ($i, $j) = (2, 1);
+                    $entry
+                },
+                {
+                    let ($i, $j) = (2, 2);
+                    $entry
+                },
+            ],
+        ]
+    };
 }
+pub(crate) use tensor;
 
 /// `dJ/dF`.
 #[inline(always)]
 pub fn cofactors<T: Real>(F: &Tensor<T>) -> Tensor<T> {
-    tensor(|i, j| {
-        let (i1, i2, j1, j2) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
+    tensor!(|i, j| {
+        let (i1, i2, j1, j2): (usize, usize, usize, usize) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
         F[i1][j1].mul_add(F[i2][j2], -(F[i1][j2] * F[i2][j1]))
     })
 }

@@ -18,7 +18,7 @@ pub use triangle::nearest_weights;
 /// [`Mat3`] as a [`lane::Tensor`].
 #[inline(always)]
 pub fn entries(F: &Mat3) -> lane::Tensor<f64> {
-    lane::tensor(|i, j| F[(i, j)])
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| F[(i, j)]))
 }
 
 /// A [`lane::Tensor`] as [`Mat3`].

@@ -165,34 +165,34 @@ impl WithSimd for Sweep<'_> {
             let columns = &mut b[s.start..s.start + s.width];
             y.copy_from_slice(columns);
             columns.fill(0.0);
-            each_tile(s, values, rows, |tile, rows, width| {
+            let mut tiles = Tiles::new(s, values, rows);
+            while let Some((tile, rows, width)) = tiles.next() {
                 let (tile, y) = (S::as_simd_f32s(tile).0, &y[..width]);
                 match rows.len() / S::F32_LANES {
                     1 => forward::<S, 1>(simd, tile, rows, y, b),
                     2 => forward::<S, 2>(simd, tile, rows, y, b),
                     3 => forward::<S, 3>(simd, tile, rows, y, b),
-                    4 => forward::<S, 4>(simd, tile, rows, y, b),
                     6 => forward::<S, 6>(simd, tile, rows, y, b),
                     8 => forward::<S, 8>(simd, tile, rows, y, b),
                     _ => forward::<S, 4>(simd, tile, rows, y, b),
                 }
-            });
+            }
         }
         for s in supernodes.iter().rev() {
             let sums = &mut S::as_mut_simd_f32s(sums.as_flattened_mut()).0[..s.width];
             sums.fill(simd.splat_f32s(0.0));
-            each_tile(s, values, rows, |tile, rows, width| {
+            let mut tiles = Tiles::new(s, values, rows);
+            while let Some((tile, rows, width)) = tiles.next() {
                 let (tile, sums) = (S::as_simd_f32s(tile).0, &mut sums[..width]);
                 match rows.len() / S::F32_LANES {
                     1 => backward::<S, 1>(simd, tile, rows, sums, b),
                     2 => backward::<S, 2>(simd, tile, rows, sums, b),
                     3 => backward::<S, 3>(simd, tile, rows, sums, b),
-                    4 => backward::<S, 4>(simd, tile, rows, sums, b),
                     6 => backward::<S, 6>(simd, tile, rows, sums, b),
                     8 => backward::<S, 8>(simd, tile, rows, sums, b),
                     _ => backward::<S, 4>(simd, tile, rows, sums, b),
                 }
-            });
+            }
             for (b, sum) in b[s.start..].iter_mut().zip(sums) {
                 *b = simd.reduce_sum_f32s(*sum);
             }
@@ -200,15 +200,33 @@ impl WithSimd for Sweep<'_> {
     }
 }
 
-/// Hands over the values, the rows and the width of each tile.
-#[inline(always)]
-fn each_tile(s: &Supernode, values: &[f32], rows: &[u32], mut each: impl FnMut(&[f32], &[u32], usize)) {
-    let mut values = &values[s.values..];
-    for (k, rows) in rows[s.rows..s.rows + s.height].chunks(TILE).enumerate() {
-        let (height, width) = tile(TILE * k, s);
-        let (tile, rest) = values.split_at(height * width);
-        each(tile, rows, width);
-        values = rest;
+/// The tiles of a supernode, one after another. No closures and no iterator adaptors over vectors: what is not inlined does
+/// not know the machine's.
+struct Tiles<'a> {
+    s: &'a Supernode,
+    values: &'a [f32],
+    rows: &'a [u32],
+    row: usize,
+}
+
+impl<'a> Tiles<'a> {
+    #[inline(always)]
+    fn new(s: &'a Supernode, values: &'a [f32], rows: &'a [u32]) -> Self {
+        Tiles { s, values: &values[s.values..], rows: &rows[s.rows..s.rows + s.height], row: 0 }
+    }
+
+    /// Values, rows and width of the next tile.
+    #[inline(always)]
+    fn next(&mut self) -> Option<(&'a [f32], &'a [u32], usize)> {
+        if self.row == self.s.height {
+            return None;
+        }
+        let (height, width) = tile(self.row, self.s);
+        let (values, later) = self.values.split_at(height * width);
+        let rows = &self.rows[self.row..self.row + height];
+        self.values = later;
+        self.row += height;
+        Some((values, rows, width))
     }
 }
 
@@ -241,9 +259,10 @@ fn backward<S: Simd, const K: usize>(simd: S, tile: &[S::f32s], rows: &[u32], su
         for (x, &row) in x.iter_mut().zip(rows) {
             *x = b[row as usize];
         }
-        let x: [S::f32s; K] = std::array::from_fn(|k| S::as_simd_f32s(&x).0[k]);
+        let mut vectors = [simd.splat_f32s(0.0); K];
+        vectors.copy_from_slice(&S::as_simd_f32s(&x).0[..K]);
         for (column, sum) in tile.chunks_exact(height).zip(&mut *sums) {
-            for (x, m) in x.iter().zip(&column[at..at + K]) {
+            for (x, m) in vectors.iter().zip(&column[at..at + K]) {
                 *sum = simd.mul_add_e_f32s(*m, *x, *sum);
             }
         }
