@@ -15,6 +15,8 @@ mod golden;
 mod head;
 #[path = "verify/invariants.rs"]
 mod invariants;
+#[path = "verify/linear_map.rs"]
+mod linear_map;
 #[path = "verify/loads.rs"]
 mod loads;
 #[path = "verify/locking.rs"]

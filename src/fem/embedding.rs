@@ -60,6 +60,11 @@ pub struct Embedding {
 }
 
 impl Embedding {
+    /// Nodes that the vertices depend on, with repetition.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes
+    }
+
     /// Binds the vertices of `skin` to the elements of `mesh`; `midsides` are the mid-edge nodes of quadratic ones.
     ///
     /// # Errors

@@ -79,6 +79,7 @@ impl Sim {
     ) -> Result<(), SimError> {
         let model = self.model.clone();
         check(&model, &self.state)?;
+        super::step::complete(&model, &mut self.state, &self.work);
         let mut direction = vec![0.0; model.parts().layout.len()];
         let mut left = seed;
         for &known in knowns {

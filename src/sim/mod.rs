@@ -4,6 +4,7 @@
 
 mod access;
 mod derivative;
+mod linear_map;
 mod model;
 mod motion;
 mod pace;
@@ -145,6 +146,8 @@ pub struct Sim {
     work: step::Workspace,
     /// Strain of the accepted state, once somebody asked for it.
     strain: OnceLock<Strain>,
+    /// All nodes where the state holds only those that ports read, once somebody asked for them.
+    whole: OnceLock<Vec<crate::math::Vec3>>,
     /// Made when the first derivative is asked for.
     sensitivity: Option<Box<derivative::Sensitivity>>,
 }
@@ -157,7 +160,7 @@ impl Sim {
     pub fn new(model: Arc<Model>) -> Result<Sim, SimError> {
         let state = State::start(&model);
         let work = step::Workspace::new(&model)?;
-        Ok(Sim { model, state, work, strain: OnceLock::new(), sensitivity: None })
+        Ok(Sim { model, state, work, strain: OnceLock::new(), whole: OnceLock::new(), sensitivity: None })
     }
 
     /// The model it moves.
@@ -185,7 +188,7 @@ impl Sim {
         state.inputs.copy_from_slice(&self.state.inputs);
         let report = step::initialise(&self.model, &mut state, &mut self.work)?;
         self.state = state;
-        self.strain.take();
+        self.forget();
         Ok(report)
     }
 
@@ -215,7 +218,7 @@ impl Sim {
             return Err(SimError::StepLength(dt));
         }
         let report = step::advance(&self.model, &mut self.state, &mut self.work, dt)?;
-        self.strain.take();
+        self.forget();
         Ok(report)
     }
 
@@ -224,12 +227,20 @@ impl Sim {
         if !self.state.outputs.converged {
             return Strain { min_det_f: 1.0, max_stretch: 1.0, energy: 0.0 };
         }
-        *self.strain.get_or_init(|| step::strain(&self.model, &self.state))
+        *self.strain.get_or_init(|| step::strain(&self.model, &self.state, self.positions()))
+    }
+
+    /// Drops what was found out about the state before.
+    fn forget(&mut self) {
+        self.strain.take();
+        self.whole.take();
     }
 
     /// A snapshot: time, positions, velocities, inputs, outputs and what the solver remembers.
     pub fn save(&self) -> State {
-        self.state.clone()
+        let mut state = self.state.clone();
+        step::complete(&self.model, &mut state, &self.work);
+        state
     }
 
     /// Returns to a snapshot; outputs are back at once, and the next step gives the same bits as it did then.
@@ -241,7 +252,7 @@ impl Sim {
             return Err(SimError::ForeignState { found: state.config.x.len(), wanted: self.model.mesh().nodes.len() });
         }
         self.state.clone_from(state);
-        self.strain.take();
+        self.forget();
         Ok(())
     }
 
@@ -259,6 +270,7 @@ impl Sim {
             return Err(SimError::StartNotFinite { node, x: x.x, y: x.y, z: x.z });
         }
         self.strain();
+        step::complete(&self.model, &mut self.state, &self.work);
         for &a in &self.model.dofs().free {
             self.state.config.x[a as usize] = x[a as usize];
         }
@@ -271,12 +283,15 @@ impl Sim {
     /// As after [`Sim::new`].
     pub fn reset(&mut self) {
         self.state = State::start(&self.model);
-        self.strain.take();
+        self.forget();
     }
 
     /// The solver's current positions, m, by node of the mesh.
     pub fn positions(&self) -> &[crate::math::Vec3] {
-        &self.state.config.x
+        if !self.state.partial {
+            return &self.state.config.x;
+        }
+        self.whole.get_or_init(|| self.save().config.x)
     }
 
     /// Stored entries of the stiffness matrix's factor (8 bytes each).

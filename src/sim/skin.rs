@@ -59,6 +59,12 @@ impl Skin {
         (0..self.len()).map(|k| self.of(k, field)).collect()
     }
 
+    /// Calls `visit` with every node of the mesh that a vertex depends on.
+    pub(super) fn each_node(&self, visit: impl FnMut(u32)) {
+        let nodes = self.embedding.as_ref().map_or(&self.nodes[..], Embedding::nodes);
+        nodes.iter().copied().for_each(visit);
+    }
+
     /// A point in a triangle: `corners` are nodes of the mesh, or vertices of the finer skin where there is one.
     pub(super) fn within(&self, corners: [u32; 3], weights: [f64; 3], field: &[Vec3]) -> Vec3 {
         let corner = |a: u32| self.embedding.as_ref().map_or_else(|| field[a as usize], |e| e.of(a as usize, field));

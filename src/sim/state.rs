@@ -42,6 +42,8 @@ pub(super) struct Outputs {
 pub struct State {
     pub(super) t: f64,
     pub(super) config: Configuration,
+    /// Whether only the nodes that ports read are where they belong; never so in a snapshot.
+    pub(super) partial: bool,
     /// What inertia knows of the steps before.
     pub(super) motion: Motion,
     /// What terms remember of the steps before (viscous overstress); empty in scenes without.
@@ -105,6 +107,7 @@ impl State {
         State {
             t: 0.0,
             config: Configuration { x: parts.mesh.nodes.clone(), poses: vec![Pose::REST; n] },
+            partial: false,
             motion: Motion::still(parts.mesh.nodes.len(), parts.inertia.as_ref()),
             history: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
@@ -220,7 +223,7 @@ impl State {
             })),
         };
         let outputs = Outputs { reaction_force, reaction_torque, iterations, residual, converged, kinetic, dt };
-        Ok(State { t, config, motion, history, inputs, applied, linearisation, outputs })
+        Ok(State { t, config, partial: false, motion, history, inputs, applied, linearisation, outputs })
     }
 }
 

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use super::linear_map::LinearMap;
 use super::model::{Drive, Model};
 use super::motion::Motion;
 use super::pace::{Pace, even_part};
@@ -61,6 +62,8 @@ pub struct StepReport {
 /// Scratch of the solver; never saved. Allocates when made, then no more.
 pub(super) struct Workspace {
     minimiser: Minimiser,
+    /// The answer to every input, in scenes that are linear in them.
+    table: Table,
     /// Which linearisation the minimiser's factor was made from.
     factored: Option<Arc<Linearisation>>,
     config: Configuration,
@@ -79,6 +82,15 @@ pub(super) struct Workspace {
     wrenches: Vec<(Vec3, Vec3)>,
 }
 
+/// Whether steps are read off a table.
+enum Table {
+    /// Not asked yet.
+    Unknown,
+    /// The scene is not linear in its inputs, or the table would be too large.
+    None,
+    Made(Box<LinearMap>),
+}
+
 impl Workspace {
     pub fn new(model: &Model) -> Result<Workspace, SolveError> {
         let parts = model.parts();
@@ -95,6 +107,7 @@ impl Workspace {
         };
         Ok(Workspace {
             minimiser: Minimiser::new(&problem, parts.strategy)?,
+            table: Table::Unknown,
             factored: None,
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             before: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
@@ -154,6 +167,9 @@ fn set_off(model: &Model, state: &mut State, work: &mut Workspace) {
 /// Moves `state` on by `dt` seconds, or leaves it as it is.
 pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> Result<StepReport, SimError> {
     check_inputs(model, &state.inputs)?;
+    if let Some(report) = look_up(model, state, work, dt)? {
+        return Ok(report);
+    }
     read_pivots(model, &state.inputs, &mut work.pivots);
     work.config.copy_from(&state.config);
     work.motion.copy_from(&state.motion);
@@ -220,7 +236,7 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     if let Some(pace) = pace.filter(|pace| !pace.holds(report.time_error)) {
         report.warnings.push(pace.broken(report.time_error));
     }
-    warn_of_jumps(model, &state.config, &work.config, &mut report);
+    warn_of_jumps(model, worst_jump(model, &state.config.x), worst_jump(model, &work.config.x), &mut report);
     state.t += dt;
     state.config.copy_from(&work.config);
     state.motion.copy_from(&work.motion);
@@ -230,6 +246,66 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     report.converged = true;
     read_outputs(model, state, work, &report, dt);
     Ok(report)
+}
+
+/// A step of a scene that is linear in its inputs: read off its table; `None` where that cannot be done.
+fn look_up(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> Result<Option<StepReport>, SimError> {
+    let mut report = StepReport::new(1);
+    let serves = match &work.table {
+        Table::None => return Ok(None),
+        Table::Unknown => false,
+        Table::Made(map) => map.serves(&state.inputs),
+    };
+    if !serves {
+        complete(model, state, work);
+        work.factored = None;
+        let made = LinearMap::new(model, &mut work.minimiser, &state.inputs);
+        let refused = |source| SimError::Solve { t: state.t, dt, cuts: 1, spent: report.iterations, source };
+        let Some((map, solves)) = made.map_err(refused)? else {
+            work.table = Table::None;
+            return Ok(None);
+        };
+        report.iterations = solves;
+        report.factorisations = 1;
+        work.table = Table::Made(Box::new(map));
+    }
+    place_bones(model, &state.inputs, &mut work.config);
+    let Table::Made(map) = &mut work.table else {
+        return Ok(None);
+    };
+    map.set(model, &state.inputs, &work.config.poses);
+    let [residual, correction] = map.bounds();
+    if !(residual.is_finite() && correction <= model.parts().strategy.tolerance) {
+        // Inputs so large that the table's round-off shows.
+        map.set(model, &state.applied, &state.config.poses);
+        complete(model, state, work);
+        return Ok(None);
+    }
+    let before = worst_jump(model, &state.config.x);
+    read_pivots(model, &state.inputs, &mut work.pivots);
+    state.config.poses.copy_from_slice(&work.config.poses);
+    map.place_seen(model, &state.inputs, &work.pivots, &mut state.config);
+    state.partial = true;
+    warn_of_jumps(model, before, worst_jump(model, &state.config.x), &mut report);
+    state.t += dt;
+    state.applied.copy_from_slice(&state.inputs);
+    let o = &mut state.outputs;
+    for (b, (force, torque)) in o.reaction_force.iter_mut().zip(&mut o.reaction_torque).enumerate() {
+        (*force, *torque) = map.reaction(model, &state.applied, b, &state.config.poses[b]);
+    }
+    (report.residual, report.correction) = (residual, correction);
+    (o.iterations, o.residual, o.converged, o.dt) = (report.iterations, residual, true, dt);
+    Ok(Some(report))
+}
+
+/// Puts all nodes of a state that was read off the table where they belong, not only those that ports read.
+pub(super) fn complete(model: &Model, state: &mut State, work: &Workspace) {
+    if let (true, Table::Made(map)) = (state.partial, &work.table) {
+        let mut pivots = vec![Vec3::zeros(); model.parts().bones.len()];
+        read_pivots(model, &state.applied, &mut pivots);
+        map.place_whole(model, &state.applied, &pivots, &mut state.config);
+        state.partial = false;
+    }
 }
 
 impl StepReport {
@@ -297,6 +373,7 @@ fn step_piece(
         pivots,
         u,
         wrenches,
+        ..
     } = work;
     let at = At { t, dt, inputs, history, ..At::NOWHERE };
     let is_inverted = |x: &[Vec3]| min_det_f(model, x) <= 0.0;
@@ -481,10 +558,10 @@ fn min_det_f(model: &Model, x: &[Vec3]) -> f64 {
     model.parts().terms.iter().map(|t| t.min_det_f(x)).fold(f64::INFINITY, f64::min)
 }
 
-/// Strain and energy of an accepted state.
-pub(super) fn strain(model: &Model, state: &State) -> Strain {
+/// Strain and energy of an accepted state, all of whose nodes are at `x`.
+pub(super) fn strain(model: &Model, state: &State, x: &[Vec3]) -> Strain {
     let at = At { t: state.t, dt: state.outputs.dt, inputs: &state.applied, history: &state.history, ..At::NOWHERE };
-    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(&at, &state.config.x)))
+    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(&at, x)))
 }
 
 fn input3(inputs: &[f64], first: Option<usize>, row: usize) -> Vec3 {
@@ -517,6 +594,17 @@ pub(super) fn place_bones(model: &Model, inputs: &[f64], config: &mut Configurat
     }
 }
 
+/// Where the inputs want the k-th node of a bone that has the given pose.
+pub(super) fn target(model: &Model, inputs: &[f64], pivots: &[Vec3], poses: &[Pose], b: usize, k: usize) -> Vec3 {
+    let parts = model.parts();
+    let bone = &parts.bones[b];
+    let X = &parts.mesh.nodes[bone.nodes[k] as usize];
+    match bone.drive {
+        Drive::Displacement => X + input3(inputs, parts.layout.first(Slot::BoneNodal(b as u32)), k),
+        _ => poses[b].place(&pivots[b], X),
+    }
+}
+
 /// `u`: how far each prescribed node has to go.
 pub(super) fn target_increments(
     model: &Model,
@@ -525,19 +613,12 @@ pub(super) fn target_increments(
     config: &Configuration,
     u: &mut [Vec3],
 ) {
-    let parts = model.parts();
-    for (b, bone) in parts.bones.iter().enumerate() {
-        let displacement = parts.layout.first(Slot::BoneNodal(b as u32));
+    for (b, bone) in model.parts().bones.iter().enumerate() {
         for (k, &a) in bone.nodes.iter().enumerate() {
             let crate::fem::Role::Prescribed(p) = model.dofs().role[a as usize] else {
                 continue;
             };
-            let X = &parts.mesh.nodes[a as usize];
-            let target = match bone.drive {
-                Drive::Displacement => X + input3(inputs, displacement, k),
-                _ => config.poses[b].place(&pivots[b], X),
-            };
-            u[p as usize] = target - config.x[a as usize];
+            u[p as usize] = target(model, inputs, pivots, &config.poses, b, k) - config.x[a as usize];
         }
     }
 }
@@ -568,17 +649,26 @@ fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
     Ok(())
 }
 
-/// Tells of bones that moved apart across a single element.
-fn warn_of_jumps(model: &Model, before: &Configuration, after: &Configuration, report: &mut StepReport) {
+/// The largest jump of displacement across a bone-to-bone edge, in lengths of the edge.
+fn worst_jump(model: &Model, x: &[Vec3]) -> Option<(f64, u32, u32)> {
     let X = &model.mesh().nodes;
-    let jump = |x: &Configuration, a: u32, b: u32| {
-        let (a, b) = (a as usize, b as usize);
-        ((x.x[a] - X[a]) - (x.x[b] - X[b])).norm() / (X[a] - X[b]).norm()
+    let jump = |&(a, b): &(u32, u32)| {
+        let (i, j) = (a as usize, b as usize);
+        (((x[i] - X[i]) - (x[j] - X[j])).norm() / (X[i] - X[j]).norm(), a, b)
     };
-    let worst = model.osteotomy().iter().map(|&(a, b)| (jump(after, a, b), a, b)).max_by(|p, q| p.0.total_cmp(&q.0));
-    let Some((ratio, a, b)) = worst else { return };
-    if ratio > LARGEST_JUMP && jump(before, a, b) <= LARGEST_JUMP {
-        let x = X[a as usize];
+    model.osteotomy().iter().map(jump).max_by(|p, q| p.0.total_cmp(&q.0))
+}
+
+/// Tells of bones that moved apart across a single element.
+fn warn_of_jumps(
+    model: &Model,
+    before: Option<(f64, u32, u32)>,
+    after: Option<(f64, u32, u32)>,
+    report: &mut StepReport,
+) {
+    let (Some((before, ..)), Some((ratio, a, b))) = (before, after) else { return };
+    if ratio > LARGEST_JUMP && before <= LARGEST_JUMP {
+        let x = model.mesh().nodes[a as usize];
         report.warnings.push(format!(
             "bones move apart by {ratio:.2} of the edge between nodes {a} and {b} at ({:.4}, {:.4}, {:.4}) m: forces and \
              the skin there depend on the mesh; release the line with [attachment] free_rings = 1",
