@@ -8,6 +8,9 @@ use crate::mesh::TetMesh;
 use crate::port::Slot;
 use crate::sim::{self, Bone, Drive, Layout};
 
+/// Slack of a box's walls, in sizes of the box.
+const ROUND_OFF: f64 = 1e-9;
+
 impl Builder<'_> {
     /// Bones and their nodes. With `rings` > 0 a node that two bones claim belongs to neither.
     pub(super) fn bones(&self, specs: &[BoneSpec], mesh: &TetMesh, rings: u32) -> Result<Vec<Bone>, SceneError> {
@@ -20,7 +23,8 @@ impl Builder<'_> {
             let set = mesh
                 .node_set(wanted.get_ref())
                 .ok_or_else(|| self.text.unknown("node set", wanted, mesh.node_sets.iter().map(|s| s.name.as_str())))?;
-            for &a in &set.nodes {
+            let nodes = self.within(spec, &set.nodes, mesh)?;
+            for &a in &nodes {
                 let Some(other) = owner[a as usize].replace(spec.name.get_ref()) else { continue };
                 shared[a as usize] = true;
                 if rings == 0 {
@@ -38,10 +42,34 @@ impl Builder<'_> {
                 "displacement" => Drive::Displacement,
                 _ => Drive::Pose,
             };
-            bones.push(Bone { name: spec.name.get_ref().clone(), nodes: set.nodes.clone(), drive });
+            bones.push(Bone { name: spec.name.get_ref().clone(), nodes, drive });
         }
         bones.iter_mut().for_each(|b| b.nodes.retain(|a| !shared[*a as usize]));
         Ok(bones)
+    }
+
+    /// Those of `nodes` that lie in the bone's box.
+    fn within(&self, spec: &BoneSpec, nodes: &[u32], mesh: &TetMesh) -> Result<Vec<u32>, SceneError> {
+        let Some(corners) = &spec.within else {
+            return Ok(nodes.to_vec());
+        };
+        let at = corners.span().start;
+        let [low, high] = corners.get_ref().map(Vec3::from);
+        if !(0..3).all(|c| low[c].is_finite() && high[c].is_finite() && low[c] <= high[c]) {
+            let message = "`within` of [[bone]] wants the smallest corner of a box, then the largest".to_owned();
+            return Err(self.text.at(at, message));
+        }
+        let slack = ROUND_OFF * (high - low).norm();
+        let inside = |a: &&u32| {
+            let x = mesh.nodes[**a as usize];
+            (0..3).all(|c| (low[c] - slack..=high[c] + slack).contains(&x[c]))
+        };
+        let kept: Vec<u32> = nodes.iter().filter(inside).copied().collect();
+        if kept.is_empty() {
+            let message = format!("no node of bone `{}` lies `within` its box", spec.name.get_ref());
+            return Err(self.text.at(at, message));
+        }
+        Ok(kept)
     }
 
     pub(super) fn bone_starts(

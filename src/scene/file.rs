@@ -223,6 +223,7 @@ impl Constant {
 pub struct BoneSpec {
     pub name: Spanned<String>,
     pub nodes: Option<Spanned<String>>,
+    pub within: Option<Spanned<[[f64; 3]; 2]>>,
     pub drive: Option<Spanned<String>>,
     pub pivot: Option<Triple>,
     pub translation: Option<Triple>,

@@ -17,6 +17,14 @@ fn refused(scene: &str) -> String {
 }
 
 #[test]
+fn a_bone_may_take_part_of_a_node_set() {
+    let sim = sim(&format!("{GOOD}within = [[0, 0, 0], [0, 0.02, 0.01]]\n"));
+    let bone = &sim.model().parts().bones[0];
+    assert_eq!(bone.nodes.len(), 6);
+    assert!(bone.nodes.iter().all(|&a| sim.model().mesh().nodes[a as usize].z < 0.011));
+}
+
+#[test]
 fn slips_are_answered_with_line_column_and_choices() {
     for (from, to, wanted) in [
         ("nu = 0.4", "lamda = 1", vec!["line 6", "lamda", "nu"]),
@@ -29,6 +37,12 @@ fn slips_are_answered_with_line_column_and_choices() {
         ("E = 1e4\nnu = 0.4", "energy = \"mass-spring\"", vec!["`E`, which is missing"]),
         ("nu = 0.4", "energy = \"yeoh\"", vec!["`E` is no constant of `yeoh`"]),
         ("E = 1e4\nnu = 0.4", "energy = \"yeoh\"\nc10 = 1.0", vec!["`c20` is missing"]),
+        ("\"x_min\"", "\"x_min\"\nwithin = [[0, 0, 1], [1, 1, 0]]", vec!["line 10, column 10", "smallest corner"]),
+        (
+            "\"x_min\"",
+            "\"x_min\"\nwithin = [[1, 1, 1], [2, 2, 2]]",
+            vec!["line 10, column 10", "no node of bone `skull`"],
+        ),
         ("\"x_min\"", "\"xmin\"", vec!["line 9", "unknown node set `xmin`", "x_min"]),
         ("[[bone]]", "[[bone]]\nname = \"a\"\nnodes = \"x_min\"\n[[bone]]", vec!["claim node"]),
         ("cells = [4, 2, 2]", "cells = [4, 0, 2]", vec!["line 3", ">= 1"]),
