@@ -13,6 +13,7 @@
     clippy::unimplemented
 )]
 
+pub mod bench;
 pub mod bytes;
 pub mod compare;
 pub mod effect;

@@ -9,6 +9,7 @@ macro_rules! say {
 }
 
 mod bake;
+mod bench;
 mod check;
 mod demo;
 mod fmu;
@@ -49,6 +50,8 @@ enum Command {
     Presets(presets::Presets),
     /// Run the catalogue of hard cases and say how each ends
     Torture(torture::Torture),
+    /// Measure a step and its parts against what this machine allows
+    Bench(bench::Bench),
 }
 
 /// Runs the command that the arguments name.
@@ -61,6 +64,7 @@ pub fn run() -> ExitCode {
         Command::Check(check) => check.run(),
         Command::Presets(presets) => presets.run(),
         Command::Torture(torture) => torture.run(),
+        Command::Bench(bench) => bench.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
