@@ -31,5 +31,6 @@ pub mod port;
 pub mod scene;
 pub mod sim;
 pub mod solve;
+pub mod study;
 pub mod torture;
 pub mod view;
