@@ -1,6 +1,6 @@
 //! Which linear solver a scene gets.
 
-use super::{Cholesky, Gradients, Linear, LinearSolver, MOST_ENTRIES, Precision, SolveError};
+use super::{Cholesky, Gradients, LinearSolver, LinearSystems, MOST_ENTRIES, Precision, SolveError};
 use crate::fem::Pattern;
 
 /// Blocks beyond which a factor is not even analysed: no mesh of that size has one that is small.
@@ -15,13 +15,13 @@ const LARGE_FACTOR: usize = 400_000_000;
 pub(super) fn choose(
     pattern: &Pattern,
     precision: Precision,
-    linear: Linear,
+    linear: LinearSystems,
 ) -> Result<Box<dyn LinearSolver>, SolveError> {
     match linear {
-        Linear::Iterative => Ok(Box::new(Gradients::new(pattern))),
-        Linear::Direct => Ok(Box::new(Cholesky::analyse(pattern, precision, MOST_ENTRIES)?)),
-        Linear::Fitting if pattern.n() > MOST_ORDERED => Ok(Box::new(Gradients::new(pattern))),
-        Linear::Fitting => match Cholesky::analyse(pattern, precision, LARGE_FACTOR) {
+        LinearSystems::Iterative => Ok(Box::new(Gradients::new(pattern))),
+        LinearSystems::Direct => Ok(Box::new(Cholesky::analyse(pattern, precision, MOST_ENTRIES)?)),
+        LinearSystems::Fitting if pattern.n() > MOST_ORDERED => Ok(Box::new(Gradients::new(pattern))),
+        LinearSystems::Fitting => match Cholesky::analyse(pattern, precision, LARGE_FACTOR) {
             Ok(cholesky) => Ok(Box::new(cholesky)),
             Err(SolveError::TooLarge { .. }) => Ok(Box::new(Gradients::new(pattern))),
             Err(e) => Err(e),

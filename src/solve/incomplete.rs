@@ -141,3 +141,43 @@ fn multiply_transposed(A: &[f32; 9], x: &Vec3) -> Vec3 {
     let column = |j: usize| f64::from(A[3 * j]) * x.x + f64::from(A[3 * j + 1]) * x.y + f64::from(A[3 * j + 2]) * x.z;
     Vec3::new(column(0), column(1), column(2))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chain(n: usize, diagonal: f64) -> BlockMatrix {
+        let mut A = BlockMatrix::zeros(Pattern::new(n, (1..n as u32).map(|i| (i, i - 1))));
+        for j in 0..n as u32 {
+            *A.at_mut(j, j) = diagonal * Mat3::identity() + Mat3::from_fn(|r, c| if r == c { 0.0 } else { 0.1 });
+            if j > 0 {
+                *A.at_mut(j, j - 1) = Mat3::from_fn(|r, c| -0.5 + 0.1 * (r as f64) - 0.2 * (c as f64));
+            }
+        }
+        A
+    }
+
+    #[test]
+    fn without_fill_the_factor_is_exact() {
+        let A = chain(20, 4.0);
+        let mut factor = Incomplete::new(&A.pattern);
+        factor.factor(&A).expect("positive definite");
+        let x: Vec<Vec3> = (0..20).map(|k| Vec3::new((k as f64).sin(), 1.0, -0.3 * k as f64)).collect();
+        let mut b = vec![Vec3::zeros(); 20];
+        A.multiply(&x, &mut b);
+        let mut found = b.clone();
+        factor.apply(&A.pattern, &b, &mut found);
+        assert!(x.iter().zip(&found).all(|(x, f)| (x - f).norm() < 1e-5), "single precision");
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_positive_definite_gets_a_shift_or_a_refusal() {
+        let A = chain(20, 1.2);
+        let mut factor = Incomplete::new(&A.pattern);
+        assert!(factor.factor_shifted(&A, 0.0).is_err(), "it breaks down as it is");
+        factor.factor(&A).expect("with more on the diagonal it does not");
+        let mut A = chain(20, 4.0);
+        *A.at_mut(7, 7) = -Mat3::identity();
+        assert_eq!(factor.factor(&A), Err(7));
+    }
+}

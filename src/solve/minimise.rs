@@ -9,7 +9,7 @@
 
 use super::choice::choose;
 use super::lbfgs::{Lbfgs, dot};
-use super::{Linear, LinearSolver, Precision, Problem, Rung, SolveError};
+use super::{LinearSolver, LinearSystems, Precision, Problem, Rung, SolveError};
 use crate::fem::{Assembly, Configuration, Curvature};
 use crate::math::{Mat3, Vec3};
 
@@ -25,7 +25,7 @@ pub struct Strategy {
     /// Most linear solves in one minimisation.
     pub max_iterations: u32,
     /// How linear systems are solved.
-    pub linear: Linear,
+    pub linear: LinearSystems,
     /// Precision of the linear solves.
     pub precision: Precision,
     /// A rung that is left out, to be measured.

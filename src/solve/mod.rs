@@ -97,7 +97,7 @@ pub enum Precision {
 
 /// How linear systems are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Linear {
+pub enum LinearSystems {
     /// By a factor where that fits a common machine's memory, else by conjugate gradients.
     Fitting,
     /// By a factor.
