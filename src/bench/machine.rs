@@ -1,15 +1,19 @@
 //! What one core of this machine can do at best.
 
 use std::hint::black_box;
+use std::time::Instant;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::median_time;
+use super::{median, median_time};
 
 /// Seconds that a measurement takes.
 const LONG_ENOUGH: f64 = 0.2;
 /// Sums that run side by side, so that no addition waits for the one before.
 const SUMS: usize = 16;
+/// Times that two cores read their lists, and tries of that.
+const PASSES: usize = 8;
+const TRIES: usize = 5;
 /// Rounds of multiply-adds of a measurement.
 const ROUNDS: usize = 100_000;
 
@@ -21,6 +25,36 @@ pub fn bandwidth(bytes: usize) -> f64 {
         black_box(Arch::new().dispatch(Sum(black_box(&list))));
     });
     (4 * list.len()) as f64 / time
+}
+
+/// How many times the bytes of one core two read, each its own list of `bytes` bytes: what a second thread could add to
+/// work that waits for memory. By the clock, so it wants a machine with nothing else to do.
+pub fn second_core(bytes: usize) -> f64 {
+    let list = vec![1.0_f32; (bytes / 4).next_multiple_of(16 * SUMS)];
+    let pass = |list: &[f32]| {
+        for _ in 0..PASSES {
+            black_box(Arch::new().dispatch(Sum(black_box(list))));
+        }
+    };
+    let time = |body: &dyn Fn()| {
+        let mut times: Vec<f64> = (0..TRIES)
+            .map(|_| {
+                let start = Instant::now();
+                body();
+                start.elapsed().as_secs_f64()
+            })
+            .collect();
+        median(&mut times)
+    };
+    let other = list.clone();
+    let alone = time(&|| pass(&list));
+    let both = time(&|| {
+        std::thread::scope(|scope| {
+            scope.spawn(|| pass(&other));
+            pass(&list);
+        });
+    });
+    2.0 * alone / both
 }
 
 /// Multiplications and additions a second in single precision that one core does in its registers.
@@ -61,9 +95,12 @@ impl WithSimd for Multiply {
         let factor = simd.splat_f32s(self.0);
         let mut sums = [simd.splat_f32s(1.0); SUMS];
         for _ in 0..ROUNDS {
-            for sum in sums.iter_mut() {
-                *sum = simd.mul_add_f32s(*sum, factor, factor);
+            // A new list, so that the sums stay in registers.
+            let mut next = sums;
+            for (next, sum) in next.iter_mut().zip(&sums) {
+                *next = simd.mul_add_f32s(*sum, factor, factor);
             }
+            sums = next;
         }
         (sums.iter().map(|sum| simd.reduce_sum_f32s(*sum)).sum(), ROUNDS * SUMS * S::F32_LANES)
     }

@@ -12,7 +12,7 @@ mod parts;
 mod scenes;
 mod steps;
 
-pub use machine::{bandwidth, multiply_adds};
+pub use machine::{bandwidth, multiply_adds, second_core};
 pub use parts::{Parts, parts};
 pub use scenes::{SCENES, SIZES, Scene, Size};
 pub use steps::{Steps, steps};

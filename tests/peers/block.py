@@ -13,15 +13,16 @@ FACES = [(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)]
 class Mesh:
     """`x` (n, 3) m; `tets` (e, 4), or (e, 10) with mid-edge nodes in VTK's order; `sets` name -> node numbers."""
 
-    def __init__(self, order):
-        n = np.array(CELLS) + 1
+    def __init__(self, order, size=SIZE, cells=CELLS, jitter=0.0015, sets=None):
+        """A box of `cells`, its inner corners moved by up to `jitter` (m); `sets` name -> which of (n, 3) places."""
+        n = np.array(cells) + 1
         grid = np.stack(np.meshgrid(*[np.arange(k) for k in n], indexing="ij"), -1).reshape(-1, 3)
-        self.corners = grid / np.array(CELLS) * SIZE
-        inner = np.all((grid > 0) & (grid < np.array(CELLS)), axis=1)
-        self.corners[inner] += np.random.default_rng(7).uniform(-0.0015, 0.0015, (inner.sum(), 3))
+        self.corners = grid / np.array(cells) * size
+        inner = np.all((grid > 0) & (grid < np.array(cells)), axis=1)
+        self.corners[inner] += np.random.default_rng(7).uniform(-jitter, jitter, (inner.sum(), 3))
         at = lambda c: (c[0] * n[1] + c[1]) * n[2] + c[2]
         tets = []
-        for cube in itertools.product(*[range(k) for k in CELLS]):
+        for cube in itertools.product(*[range(k) for k in cells]):
             for walk in itertools.permutations(range(3)):
                 path = [np.array(cube)]
                 for axis in walk:
@@ -35,8 +36,8 @@ class Mesh:
             self.tets = np.array([[*t, *(number(t[i], t[j]) for i, j in EDGES)] for t in self.linear])
             self.x = np.vstack([self.corners, [self.corners[list(e)].mean(0) for e in middle]])
         # Whole faces of the block, so that mid-edge nodes belong to a set exactly where they lie on its face.
-        self.sets = {name: np.flatnonzero(np.abs(self.x[:, 0] - place) < 1e-12) for name, place in
-                     [("floor", 0.0), ("handle", SIZE[0])]}
+        sets = sets or {"floor": lambda x: np.abs(x[:, 0]) < 1e-12, "handle": lambda x: np.abs(x[:, 0] - size[0]) < 1e-12}
+        self.sets = {name: np.flatnonzero(holds(self.x)) for name, holds in sets.items()}
         self.order = order
 
     def write(self, path):

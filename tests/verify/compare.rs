@@ -189,7 +189,7 @@ fn the_table_of_the_source_in_numbers() {
     println!(
         "| model | skin off by mm | ms a step | ms to take a cut | ms to show the skin |\n| --- | --- | --- | --- | --- |"
     );
-    let mut line = |name: &str, u: &[Vec3], [step, cut, show]: [f64; 3]| {
+    let line = |name: &str, u: &[Vec3], [step, cut, show]: [f64; 3]| {
         println!("| {name} | {:.2} | {step:.2} | {cut:.1} | {show:.3} |", 1e3 * off(u));
         off(u)
     };
