@@ -328,7 +328,7 @@ impl Minimiser {
                 return Some((alpha, tried));
             }
             let new_slope = dot(&self.g_trial, &self.d);
-            if (tried - energy).abs() <= noise && new_slope.abs() <= -slope {
+            if tried.is_finite() && (tried - energy).abs() <= noise && new_slope.abs() <= -slope {
                 return Some((alpha, tried));
             }
             // Minimum of the parabola through energy, slope and tried; halved where that says nothing.
