@@ -70,6 +70,15 @@ pub fn small_strain(text: &str) -> Result<Vec<SmallStrain>, Error> {
     scene::small_strain(text, &parse(text, path)?).map_err(|e| scene_error(path, e))
 }
 
+/// The mesh of a scene, as it is before elements are made of it.
+///
+/// # Errors
+/// [`Error`].
+pub fn mesh(text: &str, folder: Option<&Path>) -> Result<TetMesh, Error> {
+    let path = Path::new("<text>");
+    mesh_of(text, &parse(text, path)?, path, folder)
+}
+
 /// A mesh file that a scene names, relative to `folder`.
 ///
 /// # Errors

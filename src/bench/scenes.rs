@@ -74,7 +74,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 10,
         pose: advance,
         whole: false,
-        tolerance: 1e-6,
+        tolerance: 3e-6,
     },
     Scene {
         name: "advance-0.49",
@@ -84,7 +84,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 10,
         pose: advance,
         whole: false,
-        tolerance: 1e-6,
+        tolerance: 3e-6,
     },
     Scene {
         name: "shake",
@@ -94,7 +94,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 60,
         pose: shake,
         whole: false,
-        tolerance: 3e-7,
+        tolerance: 3e-6,
     },
     Scene {
         name: "linear",
@@ -104,7 +104,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 60,
         pose: turn,
         whole: true,
-        tolerance: 1e-6,
+        tolerance: 3e-6,
     },
     Scene {
         name: "linear-skin",
@@ -114,7 +114,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 60,
         pose: turn,
         whole: false,
-        tolerance: 1e-6,
+        tolerance: 3e-6,
     },
     Scene {
         name: "corotational",
@@ -124,7 +124,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 10,
         pose: advance,
         whole: false,
-        tolerance: 1e-6,
+        tolerance: 3e-6,
     },
 ];
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use cutis::mesh::FineSkin;
-use cutis::study::{Answer, Plan, Probe, Row, advice, chart, measure, page, read_rows, write_rows};
+use cutis::study::{Answer, Plan, Probe, Row, Variant, advice, chart, measure, page, read_rows, write_rows};
 use cutis::{io, load};
 
 use super::progress;
@@ -44,7 +44,12 @@ impl Study {
             plan.reference.level -= 1;
         };
         let identity = format!("{} {:?} {} {}", finest.token(), self.mesh, self.quick, self.most_unknowns);
-        let probe = Probe { skin: FineSkin::of(finest.mesh()), most_unknowns: self.most_unknowns };
+        let mut meshes = Vec::new();
+        for level in 0..plan.levels.len() {
+            meshes.push(load::mesh(&plan.text(&Variant { level, ..plan.reference.clone() }), folder)?);
+        }
+        let probe = Probe::new(FineSkin::of(finest.mesh()), &meshes, self.most_unknowns);
+        drop(meshes);
         let reference = self.reference(&plan, folder, &identity, &probe)?;
         let csv = self.out.join("study.csv");
         let mut rows = read_rows(&identity, &io::read_text(&csv).unwrap_or_default());
@@ -59,7 +64,7 @@ impl Study {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        self.report(&plan, &rows, &reference)
+        self.report(&plan, &rows, &reference, probe.left_out)
     }
 
     /// The reference's answer, from the folder if it lies there.
@@ -81,7 +86,7 @@ impl Study {
         Ok(answer)
     }
 
-    fn report(&self, plan: &Plan, rows: &[Row], reference: &Answer) -> super::Done {
+    fn report(&self, plan: &Plan, rows: &[Row], reference: &Answer, left_out: usize) -> super::Done {
         let title = format!("What accuracy costs: {}", plan.name());
         let floor = own_error(plan, rows, reference);
         let mut about = vec![format!(
@@ -102,6 +107,9 @@ impl Study {
             None => "There is no coarser mesh to tell the reference's own error from.".into(),
         });
         about.push("Errors are those of displacements at the vertices of the reference's skin, the largest over the compared instants; force is the largest difference of a bone's reaction in units of the largest reaction. Times are CPU time of one thread, the median step.".into());
+        if left_out > 0 {
+            about.push(format!("{left_out} vertices of that skin lie outside of some mesh by more than an element and are not compared."));
+        }
         let budgets: Vec<f64> = self.budget.iter().map(|b| 1e-3 * b).collect();
         let drawn = chart(&title, rows, floor);
         io::write_bytes(&self.out.join("study.png"), &drawn.to_image().to_png())?;

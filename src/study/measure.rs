@@ -8,8 +8,9 @@ use cpu_time::ThreadTime;
 use super::Variant;
 use crate::bytes::{Reader, Truncated, Writer};
 use crate::error::Error;
+use crate::fem::{Detached, Embedding};
 use crate::load;
-use crate::mesh::FineSkin;
+use crate::mesh::{FineSkin, TetMesh};
 use crate::port::Slot;
 use crate::scene::Setting;
 use crate::sim::Sim;
@@ -21,8 +22,36 @@ const INSTANTS: usize = 10;
 pub struct Probe {
     /// That skin.
     pub skin: FineSkin,
+    /// Vertices of it that were left out, since no element of some mesh is near them.
+    pub left_out: usize,
     /// Largest number of scalar unknowns that is tried.
     pub most_unknowns: usize,
+}
+
+impl Probe {
+    /// The part of `skin` that every one of `meshes` has elements near to.
+    pub fn new(mut skin: FineSkin, meshes: &[TetMesh], most_unknowns: usize) -> Probe {
+        let all = skin.vertices.len();
+        for mesh in meshes {
+            while let Err(Detached { vertex, .. }) = Embedding::new(mesh, &[], &skin) {
+                skin = without(&skin, vertex as u32);
+            }
+        }
+        Probe { left_out: all - skin.vertices.len(), skin, most_unknowns }
+    }
+}
+
+/// A surface without a vertex, its triangles, and what these alone held.
+fn without(skin: &FineSkin, vertex: u32) -> FineSkin {
+    let triangles: Vec<[u32; 3]> = skin.triangles.iter().filter(|t| !t.contains(&vertex)).copied().collect();
+    let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let place = |a: u32| used.binary_search(&a).expect("every corner is used") as u32;
+    FineSkin {
+        vertices: used.iter().map(|&a| skin.vertices[a as usize]).collect(),
+        triangles: triangles.iter().map(|t| t.map(place)).collect(),
+    }
 }
 
 /// What a run found.

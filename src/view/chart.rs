@@ -232,3 +232,43 @@ impl Chart {
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart() -> Chart {
+        let mark = |x: f64, y: f64, group: usize| Mark { x, y, group, label: format!("<{x} & {y}>") };
+        Chart {
+            title: "a & b".into(),
+            x: "ms".into(),
+            y: "mm".into(),
+            groups: vec!["first".into(), "second".into()],
+            marks: vec![mark(0.01, 1.0, 0), mark(1.0, 0.1, 1), mark(100.0, 1e-9, 0)],
+            line: vec![0, 1],
+            floor: Some(0.01),
+        }
+    }
+
+    #[test]
+    fn every_mark_is_drawn_and_no_text_breaks_the_page() {
+        let svg = chart().to_svg();
+        assert_eq!(svg.matches("<circle").count(), 3 + 2, "marks and the names of the groups");
+        assert!(svg.contains("a &amp; b") && svg.contains("&lt;0.01 &amp; 1&gt;") && !svg.contains("NaN"));
+        let image = chart().to_image();
+        let coloured = |colour: [u8; 3]| {
+            let wanted = rgb(colour);
+            image.pixels.iter().filter(|p| p.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-3)).count()
+        };
+        let disc = std::f64::consts::PI * RADIUS * RADIUS;
+        // Two marks and a name of the first group, one of each of the second; edges are mixed with paper.
+        assert!((coloured(COLOURS[0]) as f64) > 2.0 * disc && (coloured(COLOURS[1]) as f64) > disc);
+    }
+
+    #[test]
+    fn a_point_far_below_the_floor_does_not_stretch_the_axis() {
+        let scale = Scale::of(&chart());
+        assert!(scale.y[0] > -4.0, "{:?}", scale.y);
+        assert_eq!(scale.y(1e-9), SIZE.1 - MARGIN.3);
+    }
+}

@@ -11,7 +11,8 @@ const SCENE: &str = "name = \"small\"\n[mesh.block]\nsize = [0.06, 0.04, 0.02]\n
 fn plan() -> (Plan, Probe) {
     let plan = Plan::new(SCENE, None, &[], true).expect("a plan");
     let finest = cutis::load::from_text(&plan.text(&plan.reference), None).expect("the reference").model;
-    (plan, Probe { skin: FineSkin::of(finest.mesh()), most_unknowns: 100_000 })
+    let probe = Probe::new(FineSkin::of(finest.mesh()), &[finest.mesh().clone()], 100_000);
+    (plan, probe)
 }
 
 #[test]
@@ -44,6 +45,21 @@ fn a_study_orders_methods_as_theory_does() {
     assert_eq!(write_rows("this study", &back), text);
     assert_eq!(back.len(), rows.len());
     assert!(read_rows("another study", &text).is_empty());
+}
+
+#[test]
+fn vertices_far_from_a_mesh_are_not_compared() {
+    let (plan, probe) = plan();
+    assert_eq!(probe.left_out, 0);
+    let coarse = cutis::load::mesh(&plan.text(&plan.variants[0]), None).expect("a mesh");
+    let mut skin = probe.skin.clone();
+    let n = skin.vertices.len();
+    skin.vertices[5].z += 1.0;
+    let trimmed = Probe::new(skin.clone(), &[coarse], 100_000);
+    assert!(trimmed.left_out >= 1 && trimmed.left_out < n / 4, "{} of {n}", trimmed.left_out);
+    assert!(trimmed.skin.vertices.iter().all(|x| x.z < 0.5));
+    let corners = trimmed.skin.triangles.iter().flatten().all(|&a| (a as usize) < trimmed.skin.vertices.len());
+    assert!(corners && trimmed.skin.triangles.len() < skin.triangles.len());
 }
 
 #[test]
