@@ -16,8 +16,7 @@ const EDGES: [f64; 4] = [0.0119, 0.0095, 0.0078, 0.006];
 /// Constants of laws; those of another law are dropped.
 const CONSTANTS: [&str; 12] = ["E", "nu", "mu", "alpha", "b", "c1", "c2", "c10", "c01", "c20", "c30", "kappa"];
 /// What stands on a law, and springs do not have.
-const ON_LAWS: [&str; 9] =
-    ["preset", "level", "pressure", "viscous", "fibre", "damage", "grade", "limit", "tunable"];
+const ON_LAWS: [&str; 9] = ["preset", "level", "pressure", "viscous", "fibre", "damage", "grade", "limit", "tunable"];
 
 /// The tissue tables of a scene.
 pub(super) fn tissues(scene: &Table) -> impl Iterator<Item = &Table> {

@@ -85,18 +85,22 @@ pub fn write_rows(identity: &str, rows: &[Row]) -> String {
     for row in rows {
         let name = row.name.replace('"', "'");
         out += &match &row.outcome {
-            Ok(m) => format!(
-                "\"{name}\",{},{},{},{},{},{},{},{},{},\n",
-                m.n_dofs,
-                m.solves,
-                1e3 * m.step,
-                m.setup,
-                1e-6 * m.memory as f64,
-                1e3 * m.errors.rms,
-                1e3 * m.errors.p95,
-                1e3 * m.errors.max,
-                m.errors.force
-            ),
+            Ok(m) => {
+                let e = &m.errors;
+                let numbers = [
+                    m.solves,
+                    1e3 * m.step,
+                    m.setup,
+                    1e-6 * m.memory as f64,
+                    1e3 * e.rms,
+                    1e3 * e.p95,
+                    1e3 * e.max,
+                    e.force,
+                ];
+                // Six digits: what a row is read back to is written the same again.
+                let numbers = numbers.map(|v| format!("{v:.5e}")).join(",");
+                format!("\"{name}\",{},{numbers},\n", m.n_dofs)
+            }
             Err(why) => {
                 let why = why.replace(['"', '\n'], "'");
                 format!("\"{name}\",,,,,,,,,,\"{why}\"\n")
