@@ -118,6 +118,14 @@ impl Embedding {
         let range = k * self.width..(k + 1) * self.width;
         self.nodes[range.clone()].iter().zip(&self.weights[range]).map(|(&a, w)| *w * field[a as usize]).sum()
     }
+
+    /// Adds the transpose of [`Embedding::of`]: what `w` at vertex `k` is at the nodes.
+    pub fn add_transposed(&self, k: usize, w: &Vec3, field: &mut [Vec3]) {
+        let range = k * self.width..(k + 1) * self.width;
+        for (&a, weight) in self.nodes[range.clone()].iter().zip(&self.weights[range]) {
+            field[a as usize] += *weight * w;
+        }
+    }
 }
 
 /// For each vertex a place a little way towards its triangles.

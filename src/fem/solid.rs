@@ -6,6 +6,8 @@
 //!
 //! Source: Bonet & Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", 2nd ed., 2008, chapter 9.
 
+use std::ops::Range;
+
 use pulp::Simd;
 
 use super::batch::{AddGradient, MinDetF, Points};
@@ -46,6 +48,10 @@ pub trait Material: Send + Sync {
     fn is_elastic(&self) -> bool {
         true
     }
+    /// Which of `At::inputs` it reads; its stress is linear in them.
+    fn inputs(&self) -> Range<usize> {
+        0..0
+    }
     /// Writes what point `p` has to remember of an accepted step into `history`, the list that `at.history` was.
     fn commit(&self, _at: &At, _p: usize, _F: &Mat3, _history: &mut [f64]) {}
     /// Whether `commit` writes anything.
@@ -72,6 +78,9 @@ impl Material for Box<dyn Material> {
     }
     fn is_elastic(&self) -> bool {
         (**self).is_elastic()
+    }
+    fn inputs(&self) -> Range<usize> {
+        (**self).inputs()
     }
     fn commit(&self, at: &At, p: usize, F: &Mat3, history: &mut [f64]) {
         (**self).commit(at, p, F, history);
@@ -206,6 +215,9 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
     }
     fn is_quadratic(&self) -> bool {
         self.material.is_quadratic()
+    }
+    fn inputs(&self) -> Range<usize> {
+        self.material.inputs()
     }
     fn remembers(&self) -> bool {
         self.material.remembers()

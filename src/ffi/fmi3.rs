@@ -687,8 +687,38 @@ pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
     unsafe { on(instance, table::GET_DIRECTIONAL_DERIVATIVE, body) }
 }
 
+/// `fmi3GetAdjointDerivative`: one solve with the transposed stiffness of the accepted state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetAdjointDerivative(
+    instance: fmi3Instance,
+    unknowns: *const u32,
+    nUnknowns: usize,
+    knowns: *const u32,
+    nKnowns: usize,
+    seed: *const f64,
+    nSeed: usize,
+    sensitivity: *mut f64,
+    nSensitivity: usize,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (unknowns, knowns, seed, sensitivity) = unsafe {
+            (
+                slice(unknowns, nUnknowns, "unknowns")?,
+                slice(knowns, nKnowns, "knowns")?,
+                slice(seed, nSeed, "seed")?,
+                slice_mut(sensitivity, nSensitivity, "sensitivity")?,
+            )
+        };
+        check_lengths(i, unknowns, Type::Float64, seed.len())?;
+        check_lengths(i, knowns, Type::Float64, sensitivity.len())?;
+        i.adjoint_derivative(unknowns, knowns, seed, sensitivity)
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(instance, table::GET_ADJOINT_DERIVATIVE, body) }
+}
+
 not_offered! {
-    fmi3GetAdjointDerivative(unknowns: *const u32, nUnknowns: usize, knowns: *const u32, nKnowns: usize, seed: *const f64, nSeed: usize, sensitivity: *mut f64, nSensitivity: usize): "adjoint derivatives are not provided";
     fmi3EnterConfigurationMode(): "there are no structural parameters";
     fmi3ExitConfigurationMode(): "there are no structural parameters";
     fmi3GetIntervalDecimal(valueReferences: *const u32, nValueReferences: usize, intervals: *mut f64, qualifiers: *mut i32): "no variable is a clock";

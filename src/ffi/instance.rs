@@ -283,14 +283,32 @@ impl Instance {
         seed: &[f64],
         sensitivity: &mut [f64],
     ) -> Answer {
+        let (unknowns, knowns) = self.before_derivative(unknowns, knowns)?;
+        self.sim.directional_derivative(&knowns, seed, &unknowns, sensitivity).map_err(|why| error(chain(&why)))
+    }
+
+    /// Gradient of the unknowns weighted by `seed`, as [`Instance::directional_derivative`] transposed.
+    pub(super) fn adjoint_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Answer {
+        let (unknowns, knowns) = self.before_derivative(unknowns, knowns)?;
+        self.sim.adjoint_derivative(&unknowns, seed, &knowns, sensitivity).map_err(|why| error(chain(&why)))
+    }
+
+    /// Ports of unknowns and knowns, with outputs brought up to date.
+    fn before_derivative(&mut self, unknowns: &[u32], knowns: &[u32]) -> Result<(Vec<usize>, Vec<usize>), Refusal> {
         let ports = |references: &[u32]| -> Result<Vec<usize>, Refusal> {
             references.iter().map(|&r| Ok(self.port(r, Type::Float64)?.0)).collect()
         };
         let (unknowns, knowns) = (ports(unknowns)?, ports(knowns)?);
-        if let Some(&port) = unknowns.first() {
+        for &port in &unknowns {
             self.before_get(port)?;
         }
-        self.sim.directional_derivative(&knowns, seed, &unknowns, sensitivity).map_err(|why| error(chain(&why)))
+        Ok((unknowns, knowns))
     }
 
     pub(super) fn get_i32(&self, port: usize, offset: usize, out: &mut [i32]) -> Answer {

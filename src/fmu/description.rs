@@ -97,11 +97,11 @@ fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
     let mut attributes: Attributes = vec![("modelIdentifier", MODEL_IDENTIFIER.to_owned())];
     attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
     if model.has_derivatives() {
-        let claim = match version {
-            FmiVersion::V3 => "providesDirectionalDerivatives",
-            FmiVersion::V2 => "providesDirectionalDerivative",
+        let claims: &[&'static str] = match version {
+            FmiVersion::V3 => &["providesDirectionalDerivatives", "providesAdjointDerivatives"],
+            FmiVersion::V2 => &["providesDirectionalDerivative"],
         };
-        attributes.push((claim, "true".to_owned()));
+        attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
     }
     empty(xml, "CoSimulation", attributes);
 }

@@ -3,6 +3,7 @@
 #![allow(non_snake_case)]
 
 mod access;
+mod adjoint;
 mod derivative;
 mod linear_map;
 mod model;

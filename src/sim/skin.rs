@@ -54,6 +54,14 @@ impl Skin {
         }
     }
 
+    /// Adds the transpose of [`Skin::of`]: what `w` at vertex `k` is at the nodes.
+    pub(super) fn add_transposed(&self, k: usize, w: &Vec3, field: &mut [Vec3]) {
+        match &self.embedding {
+            Some(embedding) => embedding.add_transposed(k, w, field),
+            None => field[self.nodes[k] as usize] += w,
+        }
+    }
+
     /// All vertices of a nodal field.
     pub fn all(&self, field: &[Vec3]) -> Vec<Vec3> {
         (0..self.len()).map(|k| self.of(k, field)).collect()
@@ -69,6 +77,16 @@ impl Skin {
     pub(super) fn within(&self, corners: [u32; 3], weights: [f64; 3], field: &[Vec3]) -> Vec3 {
         let corner = |a: u32| self.embedding.as_ref().map_or_else(|| field[a as usize], |e| e.of(a as usize, field));
         corners.iter().zip(weights).map(|(&a, w)| w * corner(a)).sum()
+    }
+
+    /// Adds the transpose of [`Skin::within`].
+    pub(super) fn add_within_transposed(&self, corners: [u32; 3], weights: [f64; 3], w: &Vec3, field: &mut [Vec3]) {
+        for (&a, weight) in corners.iter().zip(weights) {
+            match &self.embedding {
+                Some(embedding) => embedding.add_transposed(a as usize, &(weight * w), field),
+                None => field[a as usize] += weight * w,
+            }
+        }
     }
 
     /// Rows of three from element `offset` of the flattened field on; a whole row at a time where `out` is aligned.

@@ -67,6 +67,8 @@ pub struct Minimiser {
     /// Rotation from the configuration that was factored to the one at hand.
     frame: Mat3,
     factored: bool,
+    /// Whether that was the true stiffness.
+    exact: bool,
     /// Where the factor was made.
     factored_at: Configuration,
     trial: Configuration,
@@ -95,6 +97,7 @@ impl Minimiser {
             strategy,
             frame: Mat3::identity(),
             factored: false,
+            exact: false,
             factored_at: config.clone(),
             trial: config.clone(),
             lag: config,
@@ -118,6 +121,11 @@ impl Minimiser {
     /// Whether a factor is at hand.
     pub fn is_factored(&self) -> bool {
         self.factored
+    }
+
+    /// Whether the factor at hand is that of the true stiffness, not of the projected one.
+    pub fn is_exact(&self) -> bool {
+        self.exact
     }
 
     /// Where the factor at hand was made.
@@ -150,6 +158,7 @@ impl Minimiser {
             match self.cholesky.factor(&self.assembly.K) {
                 Ok(()) => {
                     self.factored = true;
+                    self.exact = curvature == Curvature::Exact;
                     return Ok(());
                 }
                 Err(block) if !self.strategy.has(Rung::Projection) => {

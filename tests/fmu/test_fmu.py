@@ -12,6 +12,8 @@ import textwrap
 import threading
 import time
 
+from ctypes import POINTER, c_double, c_uint32
+
 import fmpy
 import numpy as np
 import pytest
@@ -360,6 +362,33 @@ def test_directional_derivatives_meet_differences(host3, jaw):
     assert np.abs(difference - slope).max() < 2e-3 * np.abs(slope).max()
 
 
+def adjoint(host, unknowns, knowns, seed):
+    """`fmi3GetAdjointDerivative`; variables by name, values one after another."""
+    n = sum(int(np.prod(host.shape(name))) for name in knowns)
+    out, seed = np.zeros(n), np.ascontiguousarray(seed, dtype=np.float64)
+    references = [(c_uint32 * len(names))(*(host.variables[name].valueReference for name in names)) for names in (unknowns, knowns)]
+    pointer = lambda a: a.ctypes.data_as(POINTER(c_double))  # noqa: E731
+    host.fmu.fmi3GetAdjointDerivative(
+        host.fmu.component, references[0], len(unknowns), references[1], len(knowns), pointer(seed), seed.size, pointer(out), n
+    )
+    return out
+
+
+def test_adjoint_is_the_transpose_of_the_directional_derivative(host3, jaw):
+    drive(host3, jaw[:3], ["skin.position"])
+    unknowns = ["skin.position", "marker.position", "bone.reactionTorque"]
+    knowns = ["bone.translation", "bone.rotation", "load.force"]
+    rng = np.random.default_rng(3)
+    v = rng.standard_normal(sum(int(np.prod(host3.shape(name))) for name in knowns))
+    n = sum(int(np.prod(host3.shape(name))) for name in unknowns)
+    references = lambda names: [host3.variables[name].valueReference for name in names]  # noqa: E731
+    Jv = np.array(host3.fmu.getDirectionalDerivative(references(unknowns), references(knowns), list(v), n))
+    w = Jv + 0.3 * np.abs(Jv).max() * rng.standard_normal(n)
+    JTw = adjoint(host3, unknowns, knowns, w)
+    assert abs(w @ Jv - JTw @ v) < 1e-7 * (np.abs(w) @ np.abs(Jv))
+    assert not adjoint(host3, unknowns, knowns, np.zeros(n)).any()
+
+
 def test_directional_derivatives_are_those_of_fmi3(host3, host2, jaw):
     names = ["marker.position", "bone.reactionForce"]
     n = [int(np.prod(host3.shape(name))) for name in names]
@@ -412,6 +441,10 @@ MISUSE = {
     "start at NaN": "refused(lambda: host.initialise(float('nan')))",
     "event mode": "host.initialise(); refused(host.fmu.enterEventMode)",
     "derivatives": "host.initialise(); refused(lambda: host.fmu.getDirectionalDerivative([100], [10], [1.0], 1))",
+    "derivatives too early": "refused(lambda: host.fmu.getDirectionalDerivative([110], [10], [0.0] * host.variables['bone.translation'].shape[0] * 3, 27))",
+    "adjoint of short seeds": "host.initialise(); one = (c_uint32 * 1)(100); two = (c_uint32 * 1)(10); a = (c_double * 6)(); refused(lambda: host.fmu.fmi3GetAdjointDerivative(host.fmu.component, one, 1, two, 1, a, 1, a, 6))",
+    "adjoint by an output": "host.initialise(); one = (c_uint32 * 1)(110); a = (c_double * 27)(); refused(lambda: host.fmu.fmi3GetAdjointDerivative(host.fmu.component, one, 1, one, 1, a, 27, a, 27))",
+    "adjoint of nothing at all": "host.initialise(); refused(lambda: host.fmu.fmi3GetAdjointDerivative(host.fmu.component, None, 1, None, 1, None, 1, None, 1))",
     "garbage as state": "refused(lambda: host.fmu.deserializeFMUState(b'x' * 1000))",
     "state cut short": "s = host.fmu.serializeFMUState(host.fmu.getFMUState()); refused(lambda: host.fmu.deserializeFMUState(s[:-1]))",
     "state of a flipped bit": "s = bytearray(host.fmu.serializeFMUState(host.fmu.getFMUState())); s[99] ^= 4; refused(lambda: host.fmu.deserializeFMUState(bytes(s)))",
