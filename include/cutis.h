@@ -47,6 +47,8 @@ typedef enum CutisCausality {
   CUTIS_PARAMETER = 3,
   // Computed once from the scene.
   CUTIS_CALCULATED_PARAMETER = 4,
+  // A parameter that the host may set before any step, too.
+  CUTIS_TUNABLE_PARAMETER = 5,
   // There is no such port.
   CUTIS_NO_CAUSALITY = -1,
 } CutisCausality;

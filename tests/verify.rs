@@ -37,5 +37,7 @@ mod sphere;
 mod time;
 #[path = "verify/tissue.rs"]
 mod tissue;
+#[path = "verify/tunable.rs"]
+mod tunable;
 #[path = "verify/viscous.rs"]
 mod viscous;

@@ -50,7 +50,7 @@ impl Demo {
         let mut inputs: Vec<(String, Vec<f64>)> = model
             .ports()
             .iter()
-            .filter(|p| p.causality == cutis::port::Causality::Input)
+            .filter(|p| p.is_settable() && p.is_continuous())
             .map(|p| (p.name.clone(), p.start.clone()))
             .collect();
         for k in 1..=programme.steps() {

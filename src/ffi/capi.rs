@@ -66,6 +66,8 @@ pub enum CutisCausality {
     CUTIS_PARAMETER = 3,
     /// Computed once from the scene.
     CUTIS_CALCULATED_PARAMETER = 4,
+    /// A parameter that the host may set before any step, too.
+    CUTIS_TUNABLE_PARAMETER = 5,
     /// There is no such port.
     CUTIS_NO_CAUSALITY = -1,
 }
@@ -477,6 +479,7 @@ pub unsafe extern "C" fn cutis_port_causality(sim: *const CutisSim, port: usize)
         Causality::Input => CutisCausality::CUTIS_INPUT,
         Causality::Output => CutisCausality::CUTIS_OUTPUT,
         Causality::Parameter => CutisCausality::CUTIS_PARAMETER,
+        Causality::TunableParameter => CutisCausality::CUTIS_TUNABLE_PARAMETER,
         Causality::CalculatedParameter => CutisCausality::CUTIS_CALCULATED_PARAMETER,
     };
     // SAFETY: the caller's promise.

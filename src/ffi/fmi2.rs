@@ -617,6 +617,27 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
     unsafe { on(c, table::GET_DIRECTIONAL_DERIVATIVE, body) }
 }
 
+/// `fmi2GetRealOutputDerivatives`: velocities of skin and markers (order 1) in scenes with inertia.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    order: *const c_int,
+    value: *mut f64,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of this length, or null.
+        let (references, orders, out) =
+            unsafe { (slice(vr, nvr, "vr")?, slice(order, nvr, "order")?, slice_mut(value, nvr, "value")?) };
+        each_run(i, references, Type::Float64, |i, port, offset, range| {
+            i.time_derivative(port, offset, &orders[range.clone()], &mut out[range])
+        })
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(c, table::GET_REAL_OUTPUT_DERIVATIVES, body) }
+}
+
 /// The ports that scalars belong to, one after another, and where each run of scalars lies among their elements.
 #[derive(Default)]
 struct Whole {
@@ -648,7 +669,6 @@ impl Whole {
 not_offered! {
     fmi2CancelStep(): "no step runs asynchronously";
     fmi2SetRealInputDerivatives(vr: *const c_uint, nvr: usize, order: *const c_int, value: *const f64): "inputs are not interpolated";
-    fmi2GetRealOutputDerivatives(vr: *const c_uint, nvr: usize, order: *const c_int, value: *mut f64): "output derivatives are not provided";
     fmi2EnterEventMode(): "this component offers co-simulation only";
     fmi2NewDiscreteStates(eventInfo: *mut c_void): "this component offers co-simulation only";
     fmi2EnterContinuousTimeMode(): "this component offers co-simulation only";

@@ -656,6 +656,40 @@ pub unsafe extern "C" fn fmi3DeserializeFMUState(
 
 // ---------------------------------------------------------------- derivatives, configuration, clocks, model exchange
 
+/// `fmi3GetOutputDerivatives`: velocities of skin and markers (order 1) in scenes with inertia; one order a variable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetOutputDerivatives(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    orders: *const i32,
+    values: *mut f64,
+    nValues: usize,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (references, orders, out) = unsafe {
+            (
+                slice(valueReferences, nValueReferences, "valueReferences")?,
+                slice(orders, nValueReferences, "orders")?,
+                slice_mut(values, nValues, "values")?,
+            )
+        };
+        check_floats(i, references, false)?;
+        check_lengths(i, references, Type::Float64, out.len())?;
+        let mut rest = out;
+        for (&reference, order) in references.iter().zip(orders) {
+            let (port, n) = i.port(reference, Type::Float64).map(|(k, p)| (k, p.len()))?;
+            let (now, later) = rest.split_at_mut(n);
+            i.time_derivative(port, 0, &[*order], now)?;
+            rest = later;
+        }
+        Ok(())
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(instance, table::GET_OUTPUT_DERIVATIVES, body) }
+}
+
 /// `fmi3GetDirectionalDerivative`: one solve with the stiffness of the accepted state.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
@@ -742,7 +776,6 @@ not_offered! {
     fmi3GetNumberOfEventIndicators(nEventIndicators: *mut usize): "this component offers co-simulation only";
     fmi3GetNumberOfContinuousStates(nContinuousStates: *mut usize): "this component offers co-simulation only";
     fmi3EnterStepMode(): "this component has no event mode";
-    fmi3GetOutputDerivatives(valueReferences: *const u32, nValueReferences: usize, orders: *const i32, values: *mut f64, nValues: usize): "output derivatives are not provided";
     fmi3ActivateModelPartition(clockReference: u32, activationTime: f64): "this component offers co-simulation only";
 }
 

@@ -235,7 +235,7 @@ impl Instance {
     /// Whether `values` may be written to `port` from element `offset` on, in this mode.
     pub(super) fn check_set(&self, port: &Port, offset: usize, values: &[f64]) -> Answer {
         let legal = match port.causality {
-            Causality::Input => modes::INSTANTIATED | modes::INITIALIZATION | modes::STEP,
+            Causality::Input | Causality::TunableParameter => modes::INSTANTIATED | modes::INITIALIZATION | modes::STEP,
             Causality::Parameter => modes::INSTANTIATED | modes::INITIALIZATION,
             Causality::Independent | Causality::Output | Causality::CalculatedParameter => 0,
         };
@@ -285,6 +285,14 @@ impl Instance {
     ) -> Answer {
         let (unknowns, knowns) = self.before_derivative(unknowns, knowns)?;
         self.sim.directional_derivative(&knowns, seed, &unknowns, sensitivity).map_err(|why| error(chain(&why)))
+    }
+
+    /// First derivatives by time of elements of an output; no other order is known.
+    pub(super) fn time_derivative(&self, port: usize, offset: usize, orders: &[i32], out: &mut [f64]) -> Answer {
+        if let Some(order) = orders.iter().find(|&&order| order != 1) {
+            return Err(error(format!("output derivatives of order {order} are not known, only those of order 1")));
+        }
+        self.sim.time_derivative(port, offset, out).map_err(|why| error(chain(&why)))
     }
 
     /// Gradient of the unknowns weighted by `seed`, as [`Instance::directional_derivative`] transposed.

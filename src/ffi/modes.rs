@@ -72,6 +72,7 @@ pub(super) mod fmi3 {
     pub const DESERIALIZE_FMU_STATE: Call     = call("fmi3DeserializeFMUState", ANY);
     pub const GET_DIRECTIONAL_DERIVATIVE: Call = call("fmi3GetDirectionalDerivative", INITIALIZATION | STEP | TERMINATED);
     pub const GET_ADJOINT_DERIVATIVE: Call    = call("fmi3GetAdjointDerivative", INITIALIZATION | STEP | TERMINATED);
+    pub const GET_OUTPUT_DERIVATIVES: Call    = call("fmi3GetOutputDerivatives", STEP | TERMINATED);
     pub const fn get(name: &'static str) -> Call { call(name, GET) }
     pub const fn set(name: &'static str) -> Call { call(name, SET) }
 }
@@ -96,6 +97,7 @@ pub(super) mod fmi2 {
     pub const SERIALIZE_FMU_STATE: Call       = call("fmi2SerializeFMUstate", ANY);
     pub const DESERIALIZE_FMU_STATE: Call     = call("fmi2DeSerializeFMUstate", ANY);
     pub const GET_DIRECTIONAL_DERIVATIVE: Call = call("fmi2GetDirectionalDerivative", INITIALIZATION | STEP | TERMINATED);
+    pub const GET_REAL_OUTPUT_DERIVATIVES: Call = call("fmi2GetRealOutputDerivatives", STEP | STEP_FAILED | TERMINATED | ERROR);
     pub const STATUS: Mode                    = STEP | STEP_FAILED | TERMINATED | ERROR;
     pub const fn get(name: &'static str) -> Call { call(name, GET) }
     pub const fn set(name: &'static str) -> Call { call(name, SET) }

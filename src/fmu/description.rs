@@ -103,6 +103,9 @@ fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
         };
         attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
     }
+    if model.parts().inertia.is_some() {
+        attributes.push(("maxOutputDerivativeOrder", "1".to_owned()));
+    }
     empty(xml, "CoSimulation", attributes);
 }
 
@@ -225,7 +228,7 @@ fn causality(port: &Port) -> &'static str {
         Causality::Independent => "independent",
         Causality::Input => "input",
         Causality::Output => "output",
-        Causality::Parameter => "parameter",
+        Causality::Parameter | Causality::TunableParameter => "parameter",
         Causality::CalculatedParameter => "calculatedParameter",
     }
 }
@@ -233,6 +236,7 @@ fn causality(port: &Port) -> &'static str {
 fn variability(port: &Port) -> &'static str {
     match (port.causality, port.ty) {
         (Causality::Parameter | Causality::CalculatedParameter, _) => "fixed",
+        (Causality::TunableParameter, _) => "tunable",
         (_, Type::Float64) => "continuous",
         (_, Type::Int32 | Type::Boolean) => "discrete",
     }
@@ -321,15 +325,16 @@ fn variables2(xml: &mut Xml, port: &Port, types: &Types) {
 
 // ---------------------------------------------------------------- structure
 
-/// Outputs depend on every input, and in the beginning on the parameters too: a body in equilibrium feels all of them.
+/// Outputs depend on every input and tunable parameter, and in the beginning on the other parameters too: a body in
+/// equilibrium feels all of them.
 fn structure3(xml: &mut Xml, ports: &[&Port]) {
     let references = |wanted: &[Causality]| -> String {
         let found: Vec<String> =
             ports.iter().filter(|p| wanted.contains(&p.causality)).map(|p| p.reference.to_string()).collect();
         found.join(" ")
     };
-    let inputs = references(&[Causality::Input]);
-    let knowns = references(&[Causality::Input, Causality::Parameter]);
+    let inputs = references(&[Causality::Input, Causality::TunableParameter]);
+    let knowns = references(&[Causality::Input, Causality::TunableParameter, Causality::Parameter]);
     element(xml, "ModelStructure", vec![], |xml| {
         for port in ports.iter().filter(|p| p.causality == Causality::Output) {
             empty(

@@ -33,7 +33,7 @@ impl Sim {
             Slot::SkinPosition => self.model.skin().gather(&self.state.config.x, offset, out),
             Slot::SkinVelocity => self.model.skin().gather(&self.state.motion.v, offset, out),
             Slot::SkinRestPosition => self.model.skin().gather(rest, offset, out),
-            Slot::MarkerPosition => rows(|k| self.marker(k), offset, out),
+            Slot::MarkerPosition => rows(|k| self.marker(k, &self.state.config.x), offset, out),
             Slot::BoneReactionForce => rows(|k| o.reaction_force[k], offset, out),
             Slot::BoneReactionTorque => rows(|k| o.reaction_torque[k], offset, out),
             Slot::BonePoseTranslation => rows(|k| self.state.config.poses[k].t, offset, out),
@@ -47,6 +47,28 @@ impl Sim {
                 let first = self.model.parts().layout.first(input).expect("every other port is an input") + offset;
                 out.copy_from_slice(&self.state.inputs[first..first + out.len()]);
             }
+        }
+        Ok(())
+    }
+
+    /// First derivative by time of all elements of an output, as of the last accepted step: of positions, in scenes with
+    /// inertia.
+    ///
+    /// # Errors
+    /// [`SimError::Port`], [`SimError::Range`], [`SimError::NoDerivative`] in scenes without inertia.
+    pub fn time_derivative(&self, port: usize, offset: usize, out: &mut [f64]) -> Result<(), SimError> {
+        let moves = |p: &Port| matches!(p.slot, Slot::SkinPosition | Slot::MarkerPosition);
+        let p =
+            self.port(port, Type::Float64, "an output whose rate is known: skin.position, marker.position", moves)?;
+        check_range(p, offset, out.len())?;
+        if self.model.parts().inertia.is_none() {
+            let why = "without [inertia] nothing has a velocity: the scene goes from one equilibrium to the next";
+            return Err(SimError::NoDerivative(why.into()));
+        }
+        let v = &self.state.motion.v;
+        match p.slot {
+            Slot::SkinPosition => self.model.skin().gather(v, offset, out),
+            _ => rows(|k| self.marker(k, v), offset, out),
         }
         Ok(())
     }
@@ -87,9 +109,10 @@ impl Sim {
         ports.get(k).filter(|p| p.ty == ty && also(p)).ok_or(SimError::Port { port: k, n_ports: ports.len(), wanted })
     }
 
-    fn marker(&self, k: usize) -> Vec3 {
+    /// A nodal field at a marker.
+    fn marker(&self, k: usize, field: &[Vec3]) -> Vec3 {
         let marker = &self.model.parts().markers[k];
-        self.model.skin().within(marker.nodes, marker.weights, &self.state.config.x)
+        self.model.skin().within(marker.nodes, marker.weights, field)
     }
 }
 

@@ -19,6 +19,7 @@ mod step;
 
 pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
 pub use ports::Layout;
+pub(crate) use ports::MOST_TUNABLE;
 pub use scheme::Scheme;
 pub use skin::Skin;
 pub use state::{State, StateError};
@@ -64,6 +65,14 @@ pub enum SimError {
         /// Port and element, 1-based: `bone.translation[2,1]`.
         name: String,
         /// What was found.
+        value: f64,
+    },
+    /// A modulus is not positive.
+    #[error("`{name}` is {value:?} Pa; a modulus must be positive")]
+    NotPositive {
+        /// Port.
+        name: String,
+        /// What was found, Pa.
         value: f64,
     },
     /// An input moves or pushes a bone that is not driven that way.

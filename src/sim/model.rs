@@ -87,6 +87,8 @@ pub struct ModelParts {
     pub embedding: Option<Embedding>,
     /// Bones, in the order of the ports' rows; no node belongs to two.
     pub bones: Vec<Bone>,
+    /// Names of the tissues whose stiffness can be set, in order.
+    pub tunable: Vec<String>,
     /// Names of the muscles, in order.
     pub muscles: Vec<String>,
     /// Names of the force loads, in order.

@@ -31,6 +31,8 @@ const BUDGET: u32 = 4;
 const GROWTH: f64 = 2.0;
 /// Change of ln dt beyond which the stiffness with inertia is factored anew.
 const DT_DRIFT: f64 = 0.1;
+/// Change of ln E beyond which the stiffness is factored anew.
+const MODULUS_DRIFT: f64 = 0.1;
 /// A jump across a bone-to-bone edge larger than this part of its length is reported.
 const LARGEST_JUMP: f64 = 0.3;
 /// The bones' common rigid motion is taken out first where it explains all but this part of their motion.
@@ -487,9 +489,16 @@ fn restore_factor(
     let dt = problem.at.dt;
     let as_made = |l: &Linearisation| in_time(model, At { dt: l.dt, ..At::NOWHERE }, l.dt_before);
     let near = |a: f64, b: f64| a == b || a != 0.0 && b != 0.0 && (a / b).ln().abs() <= DT_DRIFT;
+    // Tunable moduli come first among the inputs; a stiffness that is never made anew must be of these very ones.
+    let tunable = 0..model.parts().tunable.len();
+    let as_stiff = |l: &Linearisation| {
+        let mut moduli = l.inputs[tunable.clone()].iter().zip(&problem.at.inputs[tunable.clone()]);
+        moduli.all(|(made, now)| made == now || !problem.is_quadratic() && (made / now).ln().abs() <= MODULUS_DRIFT)
+    };
     let serves = |l: &Linearisation| {
-        model.parts().inertia.is_none() && model.parts().n_history == 0
-            || near(l.dt, dt) && near(as_made(l).inertia.sqrt(), problem.at.inertia.sqrt())
+        as_stiff(l)
+            && (model.parts().inertia.is_none() && model.parts().n_history == 0
+                || near(l.dt, dt) && near(as_made(l).inertia.sqrt(), problem.at.inertia.sqrt()))
     };
     if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
         let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
@@ -629,6 +638,9 @@ fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
         return Err(SimError::NotFinite { name: model.input_name(k), value: *value });
     }
     let parts = model.parts();
+    if let Some(k) = (0..parts.tunable.len()).find(|&k| inputs[k] <= 0.0) {
+        return Err(SimError::NotPositive { name: model.input_name(k), value: inputs[k] });
+    }
     for (slots, drive) in [
         ([Slot::BoneTranslation, Slot::BoneRotation], Drive::Pose),
         ([Slot::BoneForce, Slot::BoneTorque], Drive::Force),

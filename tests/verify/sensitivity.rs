@@ -214,6 +214,16 @@ fn adjoint_is_the_transpose_with_a_bone_moved_by_force_and_torque() {
 }
 
 #[test]
+fn adjoint_is_the_transpose_with_stiffness_among_the_inputs() {
+    let scene =
+        SCENE.replace("DRIVE", "").replace("[[tissue]]", "[[tissue]]\ntunable = \"flesh\"\npressure = \"nodal\"");
+    transposes(&scene, |sim| {
+        bend(sim);
+        set(sim, "material.flesh.E", 0, &[12e3]);
+    });
+}
+
+#[test]
 fn adjoint_is_the_transpose_with_a_bone_moved_node_by_node() {
     transposes(&SCENE.replace("DRIVE", "drive = \"displacement\"\n"), |sim| {
         let n = get(sim, "bone.jaw.displacement").len();
