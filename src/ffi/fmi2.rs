@@ -239,7 +239,7 @@ fn run(instance: &Instance, references: &[c_uint], k: usize, ty: Type) -> Result
     let (index, port) = instance
         .port(reference, ty)
         .map_err(|why| if why.message.starts_with("no variable") { unknown() } else { why })?;
-    if offset >= port.len() || !fmu::in_fmi2(port) {
+    if offset >= port.len() || !fmu::fits_fmi2(port) {
         return Err(unknown());
     }
     let longest = (port.len() - offset).min(references.len() - k);

@@ -330,6 +330,11 @@ fn token(parts: &ModelParts, ports: &[Port]) -> String {
     let mesh = &parts.mesh;
     mesh.nodes.iter().flat_map(|x| x.iter()).for_each(|c| hash.update(c.to_le_bytes()));
     mesh.tets.as_flattened().iter().chain(&mesh.region).for_each(|i| hash.update(i.to_le_bytes()));
+    parts.midsides.as_flattened().iter().for_each(|i| hash.update(i.to_le_bytes()));
+    for set in &mesh.face_sets {
+        hash.update(&set.name);
+        set.triangles.as_flattened().iter().for_each(|i| hash.update(i.to_le_bytes()));
+    }
     for bone in &parts.bones {
         bone.nodes.iter().for_each(|a| hash.update(a.to_le_bytes()));
     }

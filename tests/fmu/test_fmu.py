@@ -11,7 +11,7 @@ import sys
 import textwrap
 import threading
 import time
-
+import zipfile
 from ctypes import POINTER, c_double, c_uint32
 
 import fmpy
@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from conftest import ARCHIVES, RELEASE, ROOT, SCENE, Archive, Host2, Host3
 from fmpy.validation import validate_fmu
+from lxml import etree
 
 DT = 1 / 64
 STEPS = 6
@@ -99,6 +100,20 @@ def test_get_is_a_copy(archive3):
     assert seconds < 1e-3
 
 
+def test_terminals_and_icons_are_valid(archive3):
+    """Against the standard's schema; every member is a variable, and bones, skin and markers have a terminal each."""
+    with zipfile.ZipFile(archive3.path) as archive:
+        tree = etree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+        icon = archive.read("terminalsAndIcons/icon.png")
+    etree.XMLSchema(etree.parse(os.path.join(os.path.dirname(fmpy.__file__), "schema/fmi3/fmi3TerminalsAndIcons.xsd"))).assertValid(tree)
+    names = {v.name for v in archive3.description.modelVariables}
+    members = {t.get("name"): {m.get("memberName"): m.get("variableName") for m in t} for t in tree.iter("Terminal")}
+    assert all(variable in names for terminal in members.values() for variable in terminal.values())
+    assert members["bones"]["translation"] == "bone.translation" and "reactionForce" in members["bones"]
+    assert {"position", "restPosition", "triangles"} <= set(members["skin"]) and "position" in members["markers"]
+    assert icon[:4] == b"\x89PNG"
+
+
 # ------------------------------------------------------------------ one trajectory
 
 
@@ -140,6 +155,13 @@ def test_fmi2_high_level_has_the_bits_of_the_c_library(archive2, jaw, through_c)
     )
     values = np.stack([result[name] for name in names], axis=1)[1:]
     assert np.array_equal(values, through_c["marker.position"])
+
+
+def test_the_full_fmi2_archive_has_the_skin_of_the_c_library(archive2_full, jaw, through_c):
+    host = Host2(archive2_full)
+    (skin,) = drive(host, jaw, ["skin.position"])
+    host.close()
+    assert np.array_equal(skin, through_c["skin.position"])
 
 
 def test_command_line_has_the_bits_of_fmi3(archive3, tmp_path):
@@ -404,6 +426,23 @@ def test_directional_derivatives_are_those_of_fmi3(host3, host2, jaw):
     assert np.array_equal(np.array(found)[::-1], np.array(wanted))
 
 
+@pytest.mark.parametrize("kind", ["fmi3", "fmi2"])
+def test_stiffness_can_be_set_between_steps(kind, host3, host2, library, jaw):
+    host = host3 if kind == "fmi3" else host2
+    variable = next(v for v in host.about.modelVariables if v.name == "material.fat.E")
+    assert (variable.causality, variable.variability) == ("parameter", "tunable")
+    drive(host, jaw, ["marker.position"])
+    before = np.asarray(host.get("bone.reactionForce")).copy()
+    host.set("material.fat.E", [2e4])
+    host.step(STEPS * DT, DT)
+    stiffer = np.asarray(host.get("bone.reactionForce"))
+    assert np.linalg.norm(stiffer) > 1.05 * np.linalg.norm(before)
+    sim = library.from_text(SCENE.read_text().replace("E = 5e3", "E = 2e4"), SCENE.parent)
+    drive(sim, jaw, ["marker.position"], c=True)
+    wanted = sim.get("bone.reactionForce").ravel()
+    assert np.abs(stiffer.ravel() - wanted).max() < 1e-3 * np.abs(wanted).max()
+
+
 def test_parallel_instances_do_not_meet(archive3, jaw, through_c):
     hosts = [Host3(archive3) for _ in range(3)]
     results = [None] * len(hosts)
@@ -430,6 +469,9 @@ MISUSE = {
     "one value of an array": "refused(lambda: host.fmu.getFloat64([100], nValues=1))",
     "set an output": "refused(lambda: host.set('marker.position', host.get('marker.position')))",
     "set NaN": "refused(lambda: host.set('bone.translation', np.full(host.shape('bone.translation'), np.nan)))",
+    "set a fixed parameter after the start": "host.initialise(); refused(lambda: host.set('bone.pivot', host.get('bone.pivot')))",
+    "a stiffness of nothing": "host.initialise(); refused(lambda: host.set('material.fat.E', [0.0]))",
+    "output derivatives without inertia": "host.initialise(); refused(lambda: host.fmu.fmi3GetOutputDerivatives(host.fmu.component, (c_uint32 * 1)(110), 1, (c_int32 * 1)(1), (c_double * 27)(), 27))",
     "step too early": "refused(lambda: host.step(0.0, 0.1))",
     "step of NaN": "host.initialise(); refused(lambda: host.step(0.0, float('nan')))",
     "step of infinity": "host.initialise(); refused(lambda: host.step(0.0, float('inf')))",
