@@ -47,3 +47,5 @@ mod tissue;
 mod tunable;
 #[path = "verify/viscous.rs"]
 mod viscous;
+#[path = "verify/watch.rs"]
+mod watch;

@@ -500,8 +500,9 @@ pub unsafe extern "C" fn fmi2DoStep(
 ) -> Status {
     let _ = noSetFMUStatePriorToCurrentPoint;
     let body = |i: &mut Instance2| {
-        let status =
-            i.common.answer(table::DO_STEP, modes::ERROR, |i| i.step(currentCommunicationPoint, communicationStepSize));
+        let status = i
+            .common
+            .answer(table::DO_STEP, modes::ERROR, |i| i.step(currentCommunicationPoint, communicationStepSize, None));
         if status == Status::Discard {
             i.common.mode = modes::STEP_FAILED;
         }

@@ -127,6 +127,9 @@ fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
         };
         attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
     }
+    if version.is_3() {
+        attributes.push(("providesIntermediateUpdate", "true".to_owned()));
+    }
     if model.parts().inertia.is_some() {
         attributes.push(("maxOutputDerivativeOrder", "1".to_owned()));
     }

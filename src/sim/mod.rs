@@ -17,6 +17,7 @@ mod start;
 mod state;
 mod step;
 
+pub use access::View;
 pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
 pub use ports::Layout;
 pub(crate) use ports::MOST_TUNABLE;
@@ -227,8 +228,27 @@ impl Sim {
         if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
             return Err(SimError::StepLength(dt));
         }
-        let report = step::advance(&self.model, &mut self.state, &mut self.work, dt)?;
+        let report = step::advance(&self.model, &mut self.state, &mut self.work, dt, None)?;
         self.forget();
+        Ok(report)
+    }
+
+    /// The same; `watch` sees every piece of the step as soon as it is accepted. Pieces before one that fails are taken back.
+    ///
+    /// # Errors
+    /// As for [`Sim::step`].
+    pub fn step_watched(&mut self, dt: f64, watch: &mut dyn FnMut(&View)) -> Result<StepReport, SimError> {
+        if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
+            return Err(SimError::StepLength(dt));
+        }
+        let model = self.model.clone();
+        let mut piece = |state: &State| {
+            let strain = || step::strain(&model, state, &state.config.x);
+            watch(&View { model: &model, state, strain: &strain });
+        };
+        let report = step::advance(&model, &mut self.state, &mut self.work, dt, Some(&mut piece))?;
+        self.forget();
+        watch(&self.view(&|| self.strain()));
         Ok(report)
     }
 

@@ -145,7 +145,7 @@ pub(super) fn initialise(model: &Model, state: &mut State, work: &mut Workspace)
         set_off(model, state, work);
         return Ok(StepReport::new(0));
     }
-    let report = advance(model, state, work, 0.0)?;
+    let report = advance(model, state, work, 0.0, None)?;
     // Nothing has moved yet: the way to the start equilibrium is no velocity.
     state.motion.halt();
     Ok(report)
@@ -166,9 +166,18 @@ fn set_off(model: &Model, state: &mut State, work: &mut Workspace) {
     state.motion.memory.iter_mut().zip(a).for_each(|(memory, a)| memory[0] = a);
 }
 
-/// Moves `state` on by `dt` seconds, or leaves it as it is.
-pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> Result<StepReport, SimError> {
+/// Moves `state` on by `dt` seconds, or leaves it as it is; `watch` sees the state after each accepted piece but the last.
+pub(super) fn advance(
+    model: &Model,
+    state: &mut State,
+    work: &mut Workspace,
+    dt: f64,
+    mut watch: Option<&mut dyn FnMut(&State)>,
+) -> Result<StepReport, SimError> {
     check_inputs(model, &state.inputs)?;
+    if let Some(report) = hold(model, state, dt) {
+        return Ok(report);
+    }
     if let Some(report) = look_up(model, state, work, dt)? {
         return Ok(report);
     }
@@ -208,6 +217,9 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
                     piece = even_part(1.0 - to, piece);
                     spent_before = report.iterations;
                 }
+                if let Some(watch) = watch.as_mut().filter(|_| to < 1.0) {
+                    watch(&halfway(model, state, work, &report, t, dt * (to - done)));
+                }
                 done = to;
             }
             Err(Setback::Coarse(factor)) => {
@@ -240,14 +252,39 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     }
     warn_of_jumps(model, worst_jump(model, &state.config.x), worst_jump(model, &work.config.x), &mut report);
     state.t += dt;
+    accept(model, state, work, &report, dt);
+    state.linearisation = linearisation;
+    Ok(report)
+}
+
+/// Takes over where `work` has come to.
+fn accept(model: &Model, state: &mut State, work: &Workspace, report: &StepReport, dt: f64) {
     state.config.copy_from(&work.config);
     state.motion.copy_from(&work.motion);
     state.history.copy_from_slice(&work.history);
     state.applied.copy_from_slice(&work.inputs);
-    state.linearisation = linearisation;
-    report.converged = true;
-    read_outputs(model, state, work, &report, dt);
-    Ok(report)
+    read_outputs(model, state, work, report, dt);
+}
+
+/// The state in the middle of a step, after a piece of `dt` seconds that ended at `t`.
+fn halfway(model: &Model, state: &State, work: &Workspace, report: &StepReport, t: f64, dt: f64) -> State {
+    let mut there = state.clone();
+    there.t = t;
+    accept(model, &mut there, work, report, dt);
+    there
+}
+
+/// A step on which nothing acts: an equilibrium stays where it is while its inputs do.
+fn hold(model: &Model, state: &mut State, dt: f64) -> Option<StepReport> {
+    let settled = state.outputs.converged && (state.linearisation.is_some() || state.partial);
+    if !(dt > 0.0 && settled && model.has_derivatives() && state.inputs == state.applied) {
+        return None;
+    }
+    let mut report = StepReport::new(1);
+    report.residual = state.outputs.residual;
+    state.t += dt;
+    (state.outputs.iterations, state.outputs.dt) = (0, dt);
+    Some(report)
 }
 
 /// A step of a scene that is linear in its inputs: read off its table; `None` where that cannot be done.

@@ -460,6 +460,86 @@ def test_parallel_instances_do_not_meet(archive3, jaw, through_c):
         host.close()
 
 
+def test_reset_after_everything_was_disturbed(host3, jaw, through_c):
+    """Every settable variable elsewhere, a few steps, an error: reset gives start values and bits of a new instance."""
+    settable = [v for v in host3.about.modelVariables if v.causality in ("input", "parameter") and v.type == "Float64"]
+    start = {v.name: np.asarray(host3.get(v.name)).copy() for v in settable}
+    host3.fmu.enterInitializationMode(startTime=7.0)
+    for v in settable:
+        host3.set(v.name, start[v.name] * 1.25 + (0.0 if v.name.startswith("material") else 1e-4))
+    host3.fmu.exitInitializationMode()
+    host3.step(7.0, DT)
+    with pytest.raises(Exception, match="doStep"):
+        host3.step(99.0, DT)
+    host3.fmu.reset()
+    for v in settable:
+        assert np.array_equal(host3.get(v.name), start[v.name]), v.name
+    (skin,) = drive(host3, jaw, ["skin.position"])
+    assert np.array_equal(skin, through_c["skin.position"])
+
+
+def test_between_steps_inputs_are_new_and_outputs_old(host3, jaw):
+    drive(host3, jaw[:2], ["skin.position"])
+    before = host3.get("skin.position")
+    host3.set("bone.translation", jaw[-1])
+    assert np.array_equal(host3.get("skin.position"), before)
+    assert np.array_equal(host3.get("bone.translation"), jaw[-1])
+
+
+def test_references_may_repeat(host3):
+    host3.initialise()
+    marker = host3.variables["marker.position"].valueReference
+    n = int(np.prod(host3.shape("marker.position")))
+    twice = host3.fmu.getFloat64([marker, 0, marker], nValues=2 * n + 1)
+    assert twice[:n] == twice[n + 1 :]
+
+
+def test_ten_tenths_reach_the_stop_time(archive3):
+    host = Host3(archive3)
+    host.fmu.enterInitializationMode(startTime=0.0, stopTime=1.0)
+    host.fmu.exitInitializationMode()
+    for k in range(10):
+        host.step(sum([0.1] * k), 0.1)
+    host.close()
+
+
+def test_categories_are_told_apart_and_silence_is_kept(archive3, jaw):
+    host = Host3(archive3, logging=True)
+    host.initialise()
+    told = {}
+    for names in (["logStatusError"], ["logNonlinearSystems"], []):
+        host.fmu.setDebugLogging(True, names)
+        host.log.clear()
+        host.set("bone.translation", jaw[len(told) + 1])
+        host.step(len(told) * DT, DT)
+        told[" ".join(names)] = list(host.log)
+    host.fmu.setDebugLogging(False, [])
+    host.log.clear()
+    with pytest.raises(Exception, match="doStep"):
+        host.step(99.0, DT)
+    assert told["logStatusError"] == [] and len(told["logNonlinearSystems"]) == len(told[""]) == 1 and host.log == []
+    host.close()
+
+
+def test_instances_leave_nothing_behind(tmp_path):
+    """Memory, threads, working folder and open files of the host after hundreds of instances are those after the first."""
+    script = f"""
+        import os, sys; sys.path.insert(0, {str(ROOT / "tests" / "fmu")!r})
+        import bars
+        archive, _ = bars.packed("small", {str(tmp_path)!r})
+        seen = lambda: (os.getcwd(), len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd")), open("/proc/self/status").read().split("SigCgt")[1].split()[1])
+        for _ in range(50):
+            bars.cycle(archive)
+        before, memory = seen(), bars.resident()
+        for _ in range(250):
+            bars.cycle(archive)
+        assert seen() == before, (before, seen())
+        assert bars.resident() - memory < 2e6, bars.resident() - memory
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and done.stdout == done.stderr == "", done.stdout + done.stderr
+
+
 # ------------------------------------------------------------------ misuse, each in a process of its own
 
 MISUSE = {
@@ -472,6 +552,18 @@ MISUSE = {
     "set a fixed parameter after the start": "host.initialise(); refused(lambda: host.set('bone.pivot', host.get('bone.pivot')))",
     "a stiffness of nothing": "host.initialise(); refused(lambda: host.set('material.fat.E', [0.0]))",
     "output derivatives without inertia": "host.initialise(); refused(lambda: host.fmu.fmi3GetOutputDerivatives(host.fmu.component, (c_uint32 * 1)(110), 1, (c_int32 * 1)(1), (c_double * 27)(), 27))",
+    "step after an error": "host.initialise(); refused(lambda: host.fmu.getFloat64([999])); refused(lambda: host.step(0.0, 0.125)); refused(lambda: host.set('bone.translation', 0 * host.get('bone.translation')))",
+    "terminate after an error": "host.initialise(); refused(lambda: host.fmu.getFloat64([999])); refused(host.fmu.terminate)",
+    "step past the stop time": "host.fmu.enterInitializationMode(startTime=0.0, stopTime=0.25); host.fmu.exitInitializationMode(); host.step(0.0, 0.25); refused(lambda: host.step(0.25, 0.01))",
+    "set after terminate": "host.initialise(); host.fmu.terminate(); refused(lambda: host.set('bone.translation', 0 * host.get('bone.translation')))",
+    "step after terminate": "host.initialise(); host.fmu.terminate(); refused(lambda: host.step(0.0, 0.1))",
+    "exit before enter": "refused(host.fmu.exitInitializationMode)",
+    "configuration mode": "refused(host.fmu.enterConfigurationMode)",
+    "the type of another": "refused(lambda: host.fmu.getInt32([100], nValues=3)); host.fmu.reset(); refused(lambda: host.fmu.getFloat64([200]))",
+    "set topology": "refused(lambda: host.fmu.setInt32([301], [0]))",
+    "undeclared category": "refused(lambda: host.fmu.setDebugLogging(True, ['logMagic']))",
+    "stop before start": "refused(lambda: host.fmu.enterInitializationMode(startTime=1.0, stopTime=0.5))",
+    "clock": "refused(lambda: host.fmu.fmi3GetClock(host.fmu.component, (c_uint32 * 1)(0), 1, (c_bool * 1)()))",
     "step too early": "refused(lambda: host.step(0.0, 0.1))",
     "step of NaN": "host.initialise(); refused(lambda: host.step(0.0, float('nan')))",
     "step of infinity": "host.initialise(); refused(lambda: host.step(0.0, float('inf')))",
