@@ -11,6 +11,7 @@ use std::ops::Range;
 
 use pulp::Simd;
 
+use crate::energy::InvariantTangent;
 use crate::fem::{At, Material};
 use crate::math::lane::{Lane, Tensor};
 use crate::math::{Mat3, Mat9};
@@ -65,6 +66,27 @@ impl<M: Material> Material for Tuned<M> {
             *P = factor * *P;
         }
         (factor * psi, P)
+    }
+    fn is_in_invariants(&self) -> bool {
+        self.material.is_in_invariants()
+    }
+    #[inline(always)]
+    fn tangent_in<S: Simd>(
+        &self,
+        simd: S,
+        at: &At,
+        F: &Tensor<Lane<S>>,
+        g: &Tensor<Lane<S>>,
+    ) -> InvariantTangent<Lane<S>> {
+        let t = self.material.tangent_in(simd, at, F, g);
+        let factor = Lane::splat(simd, self.tuning.factor(at));
+        InvariantTangent {
+            one: factor * t.one,
+            ff: factor * t.ff,
+            fg: factor * t.fg,
+            gg: factor * t.gg,
+            spin: factor * t.spin,
+        }
     }
     fn dPdF(&self, at: &At, p: usize, F: &Mat3) -> Mat9 {
         self.tuning.factor(at) * self.material.dPdF(at, p, F)

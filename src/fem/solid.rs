@@ -47,7 +47,13 @@ pub trait Material: Send + Sync {
     }
     /// Tangent of a function of |F|^2 and J, in many points at once; asked only where `is_in_invariants`.
     #[inline(always)]
-    fn tangent_in<S: Simd>(&self, simd: S, _F: &Tensor<Lane<S>>, _g: &Tensor<Lane<S>>) -> InvariantTangent<Lane<S>>
+    fn tangent_in<S: Simd>(
+        &self,
+        simd: S,
+        _at: &At,
+        _F: &Tensor<Lane<S>>,
+        _g: &Tensor<Lane<S>>,
+    ) -> InvariantTangent<Lane<S>>
     where
         Self: Sized,
     {
@@ -133,7 +139,13 @@ impl<M: Energy> Material for Elastic<M> {
         M::IN_INVARIANTS
     }
     #[inline(always)]
-    fn tangent_in<S: Simd>(&self, simd: S, F: &Tensor<Lane<S>>, g: &Tensor<Lane<S>>) -> InvariantTangent<Lane<S>> {
+    fn tangent_in<S: Simd>(
+        &self,
+        simd: S,
+        _at: &At,
+        F: &Tensor<Lane<S>>,
+        g: &Tensor<Lane<S>>,
+    ) -> InvariantTangent<Lane<S>> {
         self.0.tangent_in(simd, F, g)
     }
     fn is_quadratic(&self) -> bool {
@@ -222,7 +234,7 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
     }
     fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
         if curvature == Curvature::Exact && self.material.is_in_invariants() {
-            AddHessian { solid: self, x, sink }.run();
+            AddHessian { solid: self, at, x, sink }.run();
         } else {
             each_hessian(self, at, x, curvature, sink);
         }

@@ -97,8 +97,13 @@ impl Skin {
             }
             return;
         }
-        for (k, row) in (offset / 3..).zip(out.chunks_exact_mut(3)) {
-            row.copy_from_slice(self.of(k, field).as_slice());
+        match &self.embedding {
+            Some(embedding) => embedding.rows_into(offset / 3, field, out),
+            None => {
+                for (&a, row) in self.nodes[offset / 3..].iter().zip(out.as_chunks_mut::<3>().0) {
+                    *row = field[a as usize].into();
+                }
+            }
         }
     }
 }

@@ -59,7 +59,10 @@ fn nothing_moves_while_nothing_acts() {
     let held = sim.step(0.1).expect("a step");
     assert!(moved.iterations > 0 && held.iterations == 0 && held.converged, "{moved:?}, {held:?}");
     assert_eq!(held.residual, moved.residual);
-    assert_eq!((get(&sim, "skin.position"), get(&sim, "energy.elastic"), get(&sim, "time")), (x.clone(), strain, vec![0.2]));
+    assert_eq!(
+        (get(&sim, "skin.position"), get(&sim, "energy.elastic"), get(&sim, "time")),
+        (x.clone(), strain, vec![0.2])
+    );
     // What is put elsewhere by hand seeks its equilibrium again.
     let far: Vec<_> = sim.positions().iter().map(|x| x + cutis::math::Vec3::new(0.0, 0.0, 1e-4)).collect();
     sim.start_from(&far).expect("finite places");
