@@ -47,6 +47,8 @@ typedef enum CutisCausality {
   CUTIS_PARAMETER = 3,
   // Computed once from the scene.
   CUTIS_CALCULATED_PARAMETER = 4,
+  // A parameter that the host may set before any step, too.
+  CUTIS_TUNABLE_PARAMETER = 5,
   // There is no such port.
   CUTIS_NO_CAUSALITY = -1,
 } CutisCausality;
@@ -280,6 +282,48 @@ enum CutisStatus cutis_sim_initialise(struct CutisSim *sim);
 // `sim` is NULL or a live handle.
 enum CutisStatus cutis_sim_step(struct CutisSim *sim,
                                 double dt);
+
+// Change of `unknowns` with `knowns` along `seed`: the Jacobian of the last accepted equilibrium times a vector.
+//
+// `unknowns` are ports that depend on the equilibrium (skin.position, marker.position, bone.reactionForce,
+// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
+// row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
+//
+// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `knowns` and `unknowns`. CUTIS_STEP: the
+// scene has no derivatives (inertia, memory), or no equilibrium yet. `sensitivity` is then of no use.
+//
+// # Safety
+// `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
+enum CutisStatus cutis_sim_directional_derivative(struct CutisSim *sim,
+                                                  const size_t *unknowns,
+                                                  size_t n_unknowns,
+                                                  const size_t *knowns,
+                                                  size_t n_knowns,
+                                                  const double *seed,
+                                                  size_t seed_len,
+                                                  double *sensitivity,
+                                                  size_t sensitivity_len);
+
+// Gradient of the `unknowns` weighted by `seed` by all `knowns` at once: the transposed Jacobian times a vector.
+//
+// `unknowns` are ports that depend on the equilibrium (skin.position, marker.position, bone.reactionForce,
+// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
+// row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
+//
+// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `unknowns` and `knowns`. CUTIS_STEP: the
+// scene has no derivatives (inertia, memory), or no equilibrium yet. `sensitivity` is then of no use.
+//
+// # Safety
+// `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
+enum CutisStatus cutis_sim_adjoint_derivative(struct CutisSim *sim,
+                                              const size_t *unknowns,
+                                              size_t n_unknowns,
+                                              const size_t *knowns,
+                                              size_t n_knowns,
+                                              const double *seed,
+                                              size_t seed_len,
+                                              double *sensitivity,
+                                              size_t sensitivity_len);
 
 // Simulation time, s; NaN for NULL, busy and failed handles.
 //

@@ -145,6 +145,23 @@ class Sim {
     void get(std::size_t port, View<std::int32_t> values) const {
         check(cutis_sim_get_i32(sim(), port, values.data(), values.size()));
     }
+    /// Change of the ports `unknowns` with the ports `knowns` along `seed`, at the last accepted equilibrium.
+    std::vector<double> directional_derivative(const std::vector<std::size_t> &unknowns,
+                                               const std::vector<std::size_t> &knowns,
+                                               const std::vector<double> &seed) {
+        std::vector<double> out(total(unknowns));
+        check(cutis_sim_directional_derivative(sim(), unknowns.data(), unknowns.size(), knowns.data(), knowns.size(),
+                                               seed.data(), seed.size(), out.data(), out.size()));
+        return out;
+    }
+    /// Gradient of `seed . unknowns` by the ports `knowns`: one solve, however many they are.
+    std::vector<double> adjoint_derivative(const std::vector<std::size_t> &unknowns,
+                                           const std::vector<std::size_t> &knowns, const std::vector<double> &seed) {
+        std::vector<double> out(total(knowns));
+        check(cutis_sim_adjoint_derivative(sim(), unknowns.data(), unknowns.size(), knowns.data(), knowns.size(),
+                                           seed.data(), seed.size(), out.data(), out.size()));
+        return out;
+    }
     /// A copy of a Float64 port.
     std::vector<double> get(const std::string &name) const {
         const std::size_t k = port(name);
@@ -216,6 +233,11 @@ class Sim {
     CutisSim *sim() const noexcept { return sim_.get(); }
     void check(CutisStatus status) const {
         if (status != CUTIS_OK) throw Error(status, message());
+    }
+    std::size_t total(const std::vector<std::size_t> &ports) const {
+        std::size_t n = 0;
+        for (std::size_t port : ports) n += size(port);
+        return n;
     }
     /// A text of which the library says the length.
     template <class Read> static std::string text(Read read) {

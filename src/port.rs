@@ -24,6 +24,8 @@ pub enum Slot {
     LoadPressure,
     /// Displacement of every node of one nodally driven bone (index into the bones).
     BoneNodal(u32),
+    /// Young's modulus of one tunable tissue (index into those).
+    MaterialE(u32),
     /// Gravity.
     Gravity,
     /// Pivot of each bone.
@@ -84,6 +86,8 @@ pub enum Causality {
     Output,
     /// Set by the host before initialization ends.
     Parameter,
+    /// A parameter that the host may set at any communication point, too.
+    TunableParameter,
     /// Computed once from the model.
     CalculatedParameter,
 }
@@ -132,11 +136,11 @@ impl Port {
 
     /// Whether a host may write it, at some time.
     pub fn is_settable(&self) -> bool {
-        matches!(self.causality, Causality::Input | Causality::Parameter)
+        matches!(self.causality, Causality::Input | Causality::Parameter | Causality::TunableParameter)
     }
 
     /// Whether its value can change from one step to the next.
     pub fn is_continuous(&self) -> bool {
-        matches!(self.causality, Causality::Independent | Causality::Input | Causality::Output)
+        !matches!(self.causality, Causality::Parameter | Causality::CalculatedParameter)
     }
 }

@@ -43,5 +43,9 @@ mod study;
 mod time;
 #[path = "verify/tissue.rs"]
 mod tissue;
+#[path = "verify/tunable.rs"]
+mod tunable;
 #[path = "verify/viscous.rs"]
 mod viscous;
+#[path = "verify/watch.rs"]
+mod watch;

@@ -29,7 +29,7 @@ impl Demo {
         stage("meshing the head", 0);
         let (_, report) = Head::default().mesh()?;
         stage("packing the components", 20);
-        let archives = fmu::write(None, None, &self.out)?;
+        let archives = fmu::write(None, None, &self.out, false)?;
         stage("unpacking, instantiating", 60);
         let before = Instant::now();
         let mut host = Host::open(&archives[0].0)?;
@@ -50,7 +50,7 @@ impl Demo {
         let mut inputs: Vec<(String, Vec<f64>)> = model
             .ports()
             .iter()
-            .filter(|p| p.causality == cutis::port::Causality::Input)
+            .filter(|p| p.is_settable() && p.is_continuous())
             .map(|p| (p.name.clone(), p.start.clone()))
             .collect();
         for k in 1..=programme.steps() {

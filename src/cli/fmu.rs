@@ -9,6 +9,9 @@ use cutis::{io, load};
 pub struct Fmu {
     /// Scene file (TOML); the default scene if left out
     scene: Option<PathBuf>,
+    /// Also write cutis_fmi2_full.fmu, with a scalar for every coordinate of the skin
+    #[arg(long)]
+    full: bool,
     /// Folder for cutis.fmu and cutis_fmi2.fmu
     #[arg(short, long, default_value = "out")]
     out: PathBuf,
@@ -19,18 +22,19 @@ pub struct Fmu {
 
 impl Fmu {
     pub fn run(self) -> super::Done {
-        for (path, bytes) in write(self.scene.as_deref(), self.library.as_deref(), &self.out)? {
+        for (path, bytes) in write(self.scene.as_deref(), self.library.as_deref(), &self.out, self.full)? {
             say!("wrote {} ({:.2} MB)", path.display(), bytes as f64 / 1e6);
         }
         Ok(())
     }
 }
 
-/// Writes both archives into `out`; returns their paths and sizes.
+/// Writes both archives, or all three, into `out`; returns their paths and sizes.
 pub fn write(
     scene: Option<&Path>,
     library: Option<&Path>,
     out: &Path,
+    full: bool,
 ) -> Result<Vec<(PathBuf, usize)>, Box<dyn std::error::Error>> {
     let baked = match scene {
         Some(scene) => load::baked(scene)?,
@@ -40,7 +44,7 @@ pub fn write(
     let binary = io::read_bytes(&library.map_or_else(find_library, |l| Ok(l.to_path_buf()))?)?;
     io::create_folder(out)?;
     let mut written = Vec::new();
-    for version in [FmiVersion::V3, FmiVersion::V2] {
+    for version in [FmiVersion::V3, FmiVersion::V2, FmiVersion::V2Full].into_iter().take(if full { 3 } else { 2 }) {
         let archive = package(&loaded, &baked, &binary, version)?;
         let path = out.join(version.archive_name());
         io::write_bytes(&path, &archive)?;

@@ -16,7 +16,7 @@ pub struct Table {
 }
 
 fn columns(sim: &Sim) -> impl Iterator<Item = (usize, &Port)> {
-    let wanted = |p: &Port| matches!(p.causality, Causality::Input | Causality::Output) && !p.name.starts_with("skin.");
+    let wanted = |p: &Port| p.is_continuous() && p.causality != Causality::Independent && !p.name.starts_with("skin.");
     sim.model().ports().iter().enumerate().filter(move |(_, p)| wanted(p))
 }
 

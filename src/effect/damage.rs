@@ -79,6 +79,9 @@ impl<M: Material> Material for Damaged<M> {
         let H = first * self.intact.dPdF(at, p, F);
         if second == 0.0 { H } else { H + second * outer(&P0, &P0) }
     }
+    fn inputs(&self) -> std::ops::Range<usize> {
+        self.intact.inputs()
+    }
     fn remembers(&self) -> bool {
         true
     }

@@ -35,6 +35,9 @@ impl<M: Material> Material for Graded<M> {
     fn is_elastic(&self) -> bool {
         self.material.is_elastic()
     }
+    fn inputs(&self) -> std::ops::Range<usize> {
+        self.material.inputs()
+    }
     fn remembers(&self) -> bool {
         self.material.remembers()
     }

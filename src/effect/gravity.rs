@@ -33,6 +33,9 @@ impl Term for Gravity {
     }
     fn couplings(&self, _clique: &mut dyn FnMut(&[u32])) {}
     fn add_hessian(&self, _at: &At, _x: &[Vec3], _curvature: Curvature, _sink: &mut dyn HessianSink) {}
+    fn inputs(&self) -> std::ops::Range<usize> {
+        self.input..self.input + 3
+    }
     fn is_quadratic(&self) -> bool {
         true
     }

@@ -16,6 +16,7 @@ mod prestress;
 mod rayleigh;
 mod springs;
 mod tissue;
+mod tuned;
 mod viscous;
 
 pub use damage::{Damaged, Softening};
@@ -32,6 +33,7 @@ pub use prestress::{Balance, Prestress};
 pub use rayleigh::{damping_memory, stiffness_damping};
 pub use springs::{Spring, Springs, springs};
 pub use tissue::{Branches, Elements, LAWS, Law, law};
+pub use tuned::{Tuned, Tuning};
 pub use viscous::{Measure, Viscous};
 
 use crate::math::Vec3;

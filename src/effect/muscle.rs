@@ -80,6 +80,9 @@ impl Material for Muscle {
     fn is_elastic(&self) -> bool {
         false
     }
+    fn inputs(&self) -> std::ops::Range<usize> {
+        self.input..self.input + 1
+    }
 }
 
 /// Direction of a path at the place nearest to `p`, and the distance to it, m.

@@ -14,6 +14,7 @@
 //! at a lower Poisson's ratio.
 
 use super::tissue::Elements;
+use super::tuned::Tuning;
 use crate::fem::{At, Curvature, HessianSink, Strain, Term};
 use crate::math::{Mat3, Vec3, skew};
 use crate::mesh::signed_volume;
@@ -63,6 +64,7 @@ pub struct NodalPressure {
     X: Vec<Vec3>,
     tets: Vec<[u32; 4]>,
     patches: Vec<Patch>,
+    tuning: Option<Tuning>,
 }
 
 /// Nodes of a patch that are gathered without allocating.
@@ -95,7 +97,18 @@ impl NodalPressure {
             X: X.to_vec(),
             tets: tets.to_vec(),
             patches: at_node.into_values().map(patch).collect(),
+            tuning: None,
         }
+    }
+
+    /// The same with a stiffness that a host may set.
+    pub fn tuned(self, tuning: Tuning) -> NodalPressure {
+        NodalPressure { tuning: Some(tuning), ..self }
+    }
+
+    /// Factor of every stiffness.
+    fn factor(&self, at: &At) -> f64 {
+        self.tuning.map_or(1.0, |tuning| tuning.factor(at))
     }
 
     fn corners(&self, e: u32, x: &[Vec3]) -> [Vec3; 4] {
@@ -138,15 +151,16 @@ impl Term for NodalPressure {
     fn name(&self) -> &'static str {
         "nodal pressure"
     }
-    fn energy(&self, _at: &At, x: &[Vec3]) -> f64 {
-        self.patches.iter().map(|p| p.k * self.volume.U(self.J(p, x))[0]).sum()
+    fn energy(&self, at: &At, x: &[Vec3]) -> f64 {
+        self.factor(at) * self.patches.iter().map(|p| p.k * self.volume.U(self.J(p, x))[0]).sum::<f64>()
     }
-    fn add_gradient(&self, _at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
+    fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
         let mut energy = 0.0;
+        let factor = self.factor(at);
         for patch in &self.patches {
             let [U, first, _] = self.volume.U(self.J(patch, x));
-            energy += patch.k * U;
-            let pressure = patch.k * first / patch.V;
+            energy += factor * patch.k * U;
+            let pressure = factor * patch.k * first / patch.V;
             for &e in &patch.tets {
                 for (a, n) in self.tets[e as usize].iter().zip(self.volume_gradient(e, x)) {
                     g[*a as usize] += pressure * n;
@@ -163,7 +177,8 @@ impl Term for NodalPressure {
             }
         }
     }
-    fn add_hessian(&self, _at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
+    fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
+        let factor = self.factor(at);
         let (mut common, mut large) = ([Vec3::zeros(); COMMON_PATCH], Vec::new());
         for patch in &self.patches {
             let [_, first, second] = self.volume.U(self.J(patch, x));
@@ -180,7 +195,7 @@ impl Term for NodalPressure {
                     c[k as usize] += n / patch.V;
                 }
             }
-            let (projected, k) = (curvature == Curvature::Projected, patch.k);
+            let (projected, k) = (curvature == Curvature::Projected, factor * patch.k);
             sink.add_outer(&patch.nodes, c, k * if projected { second.max(0.0) } else { second });
             if self.volume != Volume::Linear {
                 let pressure = if projected { 0.0 } else { k * first / patch.V };
@@ -189,6 +204,9 @@ impl Term for NodalPressure {
                 }
             }
         }
+    }
+    fn inputs(&self) -> std::ops::Range<usize> {
+        self.tuning.map_or(0..0, |tuning| tuning.input..tuning.input + 1)
     }
     fn is_quadratic(&self) -> bool {
         self.volume == Volume::Linear

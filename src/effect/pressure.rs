@@ -46,6 +46,21 @@ impl Term for Pressure {
     fn is_lagged(&self) -> bool {
         true
     }
+    fn add_lag_transposed(&self, at: &At, xi: &[Vec3], out: &mut [Vec3]) {
+        let p = at.inputs[self.input];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|a| at.x_lag[a as usize]);
+            let s = (p / 6.0) * triangle.iter().map(|&a| xi[a as usize]).sum::<Vec3>();
+            // s . ((b - a) x (c - a)) by each of the corners.
+            let (by_b, by_c) = ((c - a).cross(&s), s.cross(&(b - a)));
+            for (&node, by) in triangle.iter().zip([-(by_b + by_c), by_b, by_c]) {
+                out[node as usize] += by;
+            }
+        }
+    }
+    fn inputs(&self) -> std::ops::Range<usize> {
+        self.input..self.input + 1
+    }
     fn is_quadratic(&self) -> bool {
         true
     }

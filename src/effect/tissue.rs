@@ -1,6 +1,7 @@
 //! Elastic tissue: tetrahedra of one material; the catalogue of laws.
 
 use super::nodal_pressure::Volume;
+use super::tuned::{Tuned, Tuning};
 use super::viscous::{Measure, Viscous};
 use crate::energy::{
     Corotational, Energy, Fung, Isochoric, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, Principal, StVenantKirchhoff,
@@ -52,6 +53,8 @@ impl Elements<'_> {
 type MakeMaterial = fn(&[Vec<f64>]) -> Box<dyn Material>;
 /// Makes a term of elements, given the constants of a law.
 type MakeTerm = fn(&[Vec<f64>], Elements) -> Box<dyn Term>;
+/// The same with a stiffness that a host may set.
+type MakeTuned = fn(&[Vec<f64>], Elements, Tuning) -> Box<dyn Term>;
 /// Makes the viscous overstress of a law.
 type MakeOverstress = fn(&[Vec<f64>], Branches) -> Box<dyn Material>;
 
@@ -67,6 +70,8 @@ pub struct Law {
     pub material: MakeMaterial,
     /// The tissue as a term.
     pub term: MakeTerm,
+    /// The tissue as a term whose stiffness a host may set.
+    pub tuned: MakeTuned,
     /// How its energy depends on volume.
     pub volume: Volume,
     /// Its viscous overstress.
@@ -74,6 +79,13 @@ pub struct Law {
 }
 
 impl Law {
+    /// Young's modulus at small strain, Pa: as given where it is a constant of the law.
+    pub fn young(&self, constants: &[Vec<f64>]) -> f64 {
+        let Lame { mu, lambda } = (self.moduli)(constants);
+        let given = self.keys.iter().position(|key| *key == "E").map(|k| constants[k][0]);
+        given.unwrap_or(mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu))
+    }
+
     /// The constants with another Lame's lambda and the same shear modulus.
     pub fn with_lambda(&self, constants: &[Vec<f64>], lambda: f64) -> Vec<Vec<f64>> {
         let mu = (self.moduli)(constants).mu;
@@ -130,6 +142,10 @@ fn term<M: Energy + 'static>(law: M, elements: Elements) -> Box<dyn Term> {
     elements.of(Elastic(law))
 }
 
+fn tuned<M: Energy + 'static>(law: M, elements: Elements, tuning: Tuning) -> Box<dyn Term> {
+    elements.of(Tuned { material: Elastic(law), tuning })
+}
+
 fn lame(c: &[Vec<f64>]) -> Lame {
     Lame::new(c[0][0], c[1][0])
 }
@@ -165,9 +181,9 @@ fn veronda_westmann(c: &[Vec<f64>]) -> VerondaWestmann {
 }
 
 /// A law in Young's modulus and Poisson's ratio.
-const fn in_e_nu(name: &'static str, material: MakeMaterial, term: MakeTerm) -> Law {
+const fn in_e_nu(name: &'static str, material: MakeMaterial, term: MakeTerm, tuned: MakeTuned) -> Law {
     let volume = Volume::Quadratic;
-    Law { name, keys: &["E", "nu"], moduli: lame, material, term, volume, viscous: viscous_neo_hookean }
+    Law { name, keys: &["E", "nu"], moduli: lame, material, term, tuned, volume, viscous: viscous_neo_hookean }
 }
 
 /// The elastic laws by name: the one list.
@@ -175,18 +191,39 @@ pub const LAWS: &[Law] = &[
     Law {
         viscous: viscous_linear,
         volume: Volume::Linear,
-        ..in_e_nu(Linear::NAME, |c| material(Linear(lame(c))), |c, t| term(Linear(lame(c)), t))
+        ..in_e_nu(
+            Linear::NAME,
+            |c| material(Linear(lame(c))),
+            |c, t| term(Linear(lame(c)), t),
+            |c, t, s| tuned(Linear(lame(c)), t, s),
+        )
     },
-    in_e_nu(Corotational::NAME, |c| material(Corotational(lame(c))), |c, t| term(Corotational(lame(c)), t)),
+    in_e_nu(
+        Corotational::NAME,
+        |c| material(Corotational(lame(c))),
+        |c, t| term(Corotational(lame(c)), t),
+        |c, t, s| tuned(Corotational(lame(c)), t, s),
+    ),
     in_e_nu(
         StVenantKirchhoff::NAME,
         |c| material(StVenantKirchhoff(lame(c))),
         |c, t| term(StVenantKirchhoff(lame(c)), t),
+        |c, t, s| tuned(StVenantKirchhoff(lame(c)), t, s),
     ),
-    in_e_nu(StableNeoHookean::NAME, |c| material(StableNeoHookean(lame(c))), |c, t| term(StableNeoHookean(lame(c)), t)),
+    in_e_nu(
+        StableNeoHookean::NAME,
+        |c| material(StableNeoHookean(lame(c))),
+        |c, t| term(StableNeoHookean(lame(c)), t),
+        |c, t, s| tuned(StableNeoHookean(lame(c)), t, s),
+    ),
     Law {
         volume: Volume::Logarithmic,
-        ..in_e_nu(NeoHookean::NAME, |c| material(NeoHookean(lame(c))), |c, t| term(NeoHookean(lame(c)), t))
+        ..in_e_nu(
+            NeoHookean::NAME,
+            |c| material(NeoHookean(lame(c))),
+            |c, t| term(NeoHookean(lame(c)), t),
+            |c, t, s| tuned(NeoHookean(lame(c)), t, s),
+        )
     },
     Law {
         name: MooneyRivlin::NAME,
@@ -194,6 +231,7 @@ pub const LAWS: &[Law] = &[
         moduli: |c| with_bulk(2.0 * (c[0][0] + c[1][0]), c),
         material: |c| material(bulk(mooney_rivlin(c), c)),
         term: |c, t| term(bulk(mooney_rivlin(c), c), t),
+        tuned: |c, t, s| tuned(bulk(mooney_rivlin(c), c), t, s),
         volume: Volume::Quadratic,
         viscous: |c, b| viscous(mooney_rivlin(c), b),
     },
@@ -203,6 +241,7 @@ pub const LAWS: &[Law] = &[
         moduli: |c| with_bulk(2.0 * c[0][0], c),
         material: |c| material(bulk(yeoh(c), c)),
         term: |c, t| term(bulk(yeoh(c), c), t),
+        tuned: |c, t, s| tuned(bulk(yeoh(c), c), t, s),
         volume: Volume::Quadratic,
         viscous: |c, b| viscous(yeoh(c), b),
     },
@@ -212,6 +251,7 @@ pub const LAWS: &[Law] = &[
         moduli: |c| with_bulk(c[0][0], c),
         material: |c| material(bulk(fung(c), c)),
         term: |c, t| term(bulk(fung(c), c), t),
+        tuned: |c, t, s| tuned(bulk(fung(c), c), t, s),
         volume: Volume::Quadratic,
         viscous: |c, b| viscous(fung(c), b),
     },
@@ -221,6 +261,7 @@ pub const LAWS: &[Law] = &[
         moduli: |c| with_bulk(c[0][0] * c[1][0], c),
         material: |c| material(bulk(veronda_westmann(c), c)),
         term: |c, t| term(bulk(veronda_westmann(c), c), t),
+        tuned: |c, t, s| tuned(bulk(veronda_westmann(c), c), t, s),
         volume: Volume::Quadratic,
         viscous: |c, b| viscous(veronda_westmann(c), b),
     },
@@ -230,6 +271,7 @@ pub const LAWS: &[Law] = &[
         moduli: |c| with_bulk(c[0].iter().sum(), c),
         material: |c| material(Stretches(ogden(c))),
         term: |c, t| term(Stretches(ogden(c)), t),
+        tuned: |c, t, s| tuned(Stretches(ogden(c)), t, s),
         volume: Volume::Quadratic,
         viscous: |c, b| b.over(Stretches(Ogden { kappa: 0.0, ..ogden(c) }), Measure::Finite),
     },

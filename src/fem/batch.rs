@@ -189,6 +189,7 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for AddGradient<'_, M
 /// ```
 pub(super) struct AddHessian<'a, M, const N: usize, const Q: usize> {
     pub solid: &'a Solid<M, N, Q>,
+    pub at: &'a At<'a>,
     pub x: &'a [Vec3],
     pub sink: &'a mut dyn HessianSink,
 }
@@ -216,7 +217,7 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for AddHessian<'_, M,
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let AddHessian { solid, x, sink } = self;
+        let AddHessian { solid, at, x, sink } = self;
         // Blocks of a batch by entry, and those of one element.
         let mut blocks = [[[0.0; BATCH]; 9]; MAX_BLOCKS];
         let mut upper = [Mat3::zeros(); MAX_BLOCKS];
@@ -230,7 +231,7 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for AddHessian<'_, M,
                     let F = vector.F(q);
                     let g = cofactors(&F);
                     let w = vector.w(q);
-                    let t = solid.material.tangent_in(simd, &F, &g);
+                    let t = solid.material.tangent_in(simd, at, &F, &g);
                     let InvariantTangent { one, ff, fg, gg, spin } =
                         InvariantTangent { one: w * t.one, ff: w * t.ff, fg: w * t.fg, gg: w * t.gg, spin: w * t.spin };
                     let mut dN = [[Lane::splat(simd, 0.0); 3]; N];

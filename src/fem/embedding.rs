@@ -118,6 +118,37 @@ impl Embedding {
         let range = k * self.width..(k + 1) * self.width;
         self.nodes[range.clone()].iter().zip(&self.weights[range]).map(|(&a, w)| *w * field[a as usize]).sum()
     }
+
+    /// Vertices from `first` on as rows of three, as many as `out` holds.
+    pub fn rows_into(&self, first: usize, field: &[Vec3], out: &mut [f64]) {
+        match self.width {
+            4 => self.rows::<4>(first, field, out),
+            _ => self.rows::<10>(first, field, out),
+        }
+    }
+
+    fn rows<const W: usize>(&self, first: usize, field: &[Vec3], out: &mut [f64]) {
+        let nodes = self.nodes[W * first..].as_chunks::<W>().0;
+        let weights = self.weights[W * first..].as_chunks::<W>().0;
+        for ((nodes, weights), row) in nodes.iter().zip(weights).zip(out.as_chunks_mut::<3>().0) {
+            let mut sum = [0.0; 3];
+            for (&a, w) in nodes.iter().zip(weights) {
+                let x = &field[a as usize];
+                for (sum, x) in sum.iter_mut().zip(x.iter()) {
+                    *sum += w * x;
+                }
+            }
+            *row = sum;
+        }
+    }
+
+    /// Adds the transpose of [`Embedding::of`]: what `w` at vertex `k` is at the nodes.
+    pub fn add_transposed(&self, k: usize, w: &Vec3, field: &mut [Vec3]) {
+        let range = k * self.width..(k + 1) * self.width;
+        for (&a, weight) in self.nodes[range.clone()].iter().zip(&self.weights[range]) {
+            field[a as usize] += *weight * w;
+        }
+    }
 }
 
 /// For each vertex a place a little way towards its triangles.

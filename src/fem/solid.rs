@@ -6,6 +6,8 @@
 //!
 //! Source: Bonet & Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", 2nd ed., 2008, chapter 9.
 
+use std::ops::Range;
+
 use pulp::Simd;
 
 use super::batch::{AddGradient, AddHessian, MinDetF, Points};
@@ -45,7 +47,13 @@ pub trait Material: Send + Sync {
     }
     /// Tangent of a function of |F|^2 and J, in many points at once; asked only where `is_in_invariants`.
     #[inline(always)]
-    fn tangent_in<S: Simd>(&self, simd: S, _F: &Tensor<Lane<S>>, _g: &Tensor<Lane<S>>) -> InvariantTangent<Lane<S>>
+    fn tangent_in<S: Simd>(
+        &self,
+        simd: S,
+        _at: &At,
+        _F: &Tensor<Lane<S>>,
+        _g: &Tensor<Lane<S>>,
+    ) -> InvariantTangent<Lane<S>>
     where
         Self: Sized,
     {
@@ -58,6 +66,10 @@ pub trait Material: Send + Sync {
     /// Whether its energy is strain energy.
     fn is_elastic(&self) -> bool {
         true
+    }
+    /// Which of `At::inputs` it reads; its stress is linear in them.
+    fn inputs(&self) -> Range<usize> {
+        0..0
     }
     /// Writes what point `p` has to remember of an accepted step into `history`, the list that `at.history` was.
     fn commit(&self, _at: &At, _p: usize, _F: &Mat3, _history: &mut [f64]) {}
@@ -85,6 +97,9 @@ impl Material for Box<dyn Material> {
     }
     fn is_elastic(&self) -> bool {
         (**self).is_elastic()
+    }
+    fn inputs(&self) -> Range<usize> {
+        (**self).inputs()
     }
     fn commit(&self, at: &At, p: usize, F: &Mat3, history: &mut [f64]) {
         (**self).commit(at, p, F, history);
@@ -124,7 +139,13 @@ impl<M: Energy> Material for Elastic<M> {
         M::IN_INVARIANTS
     }
     #[inline(always)]
-    fn tangent_in<S: Simd>(&self, simd: S, F: &Tensor<Lane<S>>, g: &Tensor<Lane<S>>) -> InvariantTangent<Lane<S>> {
+    fn tangent_in<S: Simd>(
+        &self,
+        simd: S,
+        _at: &At,
+        F: &Tensor<Lane<S>>,
+        g: &Tensor<Lane<S>>,
+    ) -> InvariantTangent<Lane<S>> {
         self.0.tangent_in(simd, F, g)
     }
     fn is_quadratic(&self) -> bool {
@@ -213,7 +234,7 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
     }
     fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
         if curvature == Curvature::Exact && self.material.is_in_invariants() {
-            AddHessian { solid: self, x, sink }.run();
+            AddHessian { solid: self, at, x, sink }.run();
         } else {
             each_hessian(self, at, x, curvature, sink);
         }
@@ -233,6 +254,9 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
     }
     fn is_quadratic(&self) -> bool {
         self.material.is_quadratic()
+    }
+    fn inputs(&self) -> Range<usize> {
+        self.material.inputs()
     }
     fn remembers(&self) -> bool {
         self.material.remembers()

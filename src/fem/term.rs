@@ -1,5 +1,7 @@
 //! Terms: the summands of the energy that a step minimises, and their sums over elements.
 
+use std::ops::Range;
+
 use super::Difference;
 use crate::math::{Mat3, Vec3};
 
@@ -108,6 +110,14 @@ pub trait Term: Send + Sync {
         false
     }
 
+    /// Which of `At::inputs` it reads; its gradient is linear in them.
+    fn inputs(&self) -> Range<usize> {
+        0..0
+    }
+
+    /// Adds to `out` the transposed derivative of its gradient by `At::x_lag`, applied to the nodal field `xi`.
+    fn add_lag_transposed(&self, _at: &At, _xi: &[Vec3], _out: &mut [Vec3]) {}
+
     /// Smallest det F at `x`, for terms that have solid elements.
     fn min_det_f(&self, _x: &[Vec3]) -> f64 {
         f64::INFINITY
@@ -160,6 +170,10 @@ pub trait Kernel<const N: usize>: Send + Sync {
     fn strain(&self, at: &At, e: usize, x: &[Vec3; N]) -> Strain;
     /// Whether the energy is quadratic in the positions.
     fn is_quadratic(&self) -> bool;
+    /// Which of `At::inputs` it reads; its gradient is linear in them.
+    fn inputs(&self) -> Range<usize> {
+        0..0
+    }
     /// Whether it remembers something of accepted steps.
     fn remembers(&self) -> bool {
         false
@@ -227,6 +241,10 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
 
     fn is_quadratic(&self) -> bool {
         self.0.is_quadratic()
+    }
+
+    fn inputs(&self) -> Range<usize> {
+        self.0.inputs()
     }
 
     fn strain(&self, at: &At, x: &[Vec3]) -> Strain {

@@ -13,7 +13,7 @@ use super::pointer::{self, place};
 use crate::error::Error;
 use crate::load::{self, Loaded};
 use crate::port::{Causality, Port, Type};
-use crate::sim::{Sim, State};
+use crate::sim::{Sim, SimError, State};
 
 /// Moves on a break of the binary interface only; names are added, their meaning never changes.
 const ABI: u32 = 1;
@@ -66,6 +66,8 @@ pub enum CutisCausality {
     CUTIS_PARAMETER = 3,
     /// Computed once from the scene.
     CUTIS_CALCULATED_PARAMETER = 4,
+    /// A parameter that the host may set before any step, too.
+    CUTIS_TUNABLE_PARAMETER = 5,
     /// There is no such port.
     CUTIS_NO_CAUSALITY = -1,
 }
@@ -477,6 +479,7 @@ pub unsafe extern "C" fn cutis_port_causality(sim: *const CutisSim, port: usize)
         Causality::Input => CutisCausality::CUTIS_INPUT,
         Causality::Output => CutisCausality::CUTIS_OUTPUT,
         Causality::Parameter => CutisCausality::CUTIS_PARAMETER,
+        Causality::TunableParameter => CutisCausality::CUTIS_TUNABLE_PARAMETER,
         Causality::CalculatedParameter => CutisCausality::CUTIS_CALCULATED_PARAMETER,
     };
     // SAFETY: the caller's promise.
@@ -646,6 +649,93 @@ pub unsafe extern "C" fn cutis_sim_step(sim: *mut CutisSim, dt: f64) -> CutisSta
     };
     // SAFETY: the caller's promise.
     unsafe { with(sim, body) }
+}
+
+/// Change of `unknowns` with `knowns` along `seed`: the Jacobian of the last accepted equilibrium times a vector.
+///
+/// `unknowns` are ports that depend on the equilibrium (skin.position, marker.position, bone.reactionForce,
+/// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
+/// row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
+///
+/// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `knowns` and `unknowns`. CUTIS_STEP: the
+/// scene has no derivatives (inertia, memory), or no equilibrium yet. `sensitivity` is then of no use.
+///
+/// # Safety
+/// `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_directional_derivative(
+    sim: *mut CutisSim,
+    unknowns: *const usize,
+    n_unknowns: usize,
+    knowns: *const usize,
+    n_knowns: usize,
+    seed: *const f64,
+    seed_len: usize,
+    sensitivity: *mut f64,
+    sensitivity_len: usize,
+) -> CutisStatus {
+    let body = |inner: &mut Inner| {
+        // SAFETY: the caller's promise.
+        let (unknowns, knowns, seed, out) = unsafe {
+            (
+                pointer::slice(unknowns, n_unknowns, "unknowns")?,
+                pointer::slice(knowns, n_knowns, "knowns")?,
+                pointer::slice(seed, seed_len, "seed")?,
+                pointer::slice_mut(sensitivity, sensitivity_len, "sensitivity")?,
+            )
+        };
+        inner.sim.directional_derivative(knowns, seed, unknowns, out).map_err(no_derivative)
+    };
+    // SAFETY: the caller's promise.
+    unsafe { with(sim, body) }
+}
+
+/// Gradient of the `unknowns` weighted by `seed` by all `knowns` at once: the transposed Jacobian times a vector.
+///
+/// `unknowns` are ports that depend on the equilibrium (skin.position, marker.position, bone.reactionForce,
+/// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
+/// row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
+///
+/// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `unknowns` and `knowns`. CUTIS_STEP: the
+/// scene has no derivatives (inertia, memory), or no equilibrium yet. `sensitivity` is then of no use.
+///
+/// # Safety
+/// `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_adjoint_derivative(
+    sim: *mut CutisSim,
+    unknowns: *const usize,
+    n_unknowns: usize,
+    knowns: *const usize,
+    n_knowns: usize,
+    seed: *const f64,
+    seed_len: usize,
+    sensitivity: *mut f64,
+    sensitivity_len: usize,
+) -> CutisStatus {
+    let body = |inner: &mut Inner| {
+        // SAFETY: the caller's promise.
+        let (unknowns, knowns, seed, out) = unsafe {
+            (
+                pointer::slice(unknowns, n_unknowns, "unknowns")?,
+                pointer::slice(knowns, n_knowns, "knowns")?,
+                pointer::slice(seed, seed_len, "seed")?,
+                pointer::slice_mut(sensitivity, sensitivity_len, "sensitivity")?,
+            )
+        };
+        inner.sim.adjoint_derivative(unknowns, seed, knowns, out).map_err(no_derivative)
+    };
+    // SAFETY: the caller's promise.
+    unsafe { with(sim, body) }
+}
+
+/// A derivative that the scene or the moment does not have is no slip of the caller.
+fn no_derivative(why: SimError) -> Failure {
+    let status = match why {
+        SimError::Port { .. } | SimError::Range { .. } => CutisStatus::CUTIS_ARGUMENT,
+        _ => CutisStatus::CUTIS_STEP,
+    };
+    Failure(status, chain(&why))
 }
 
 /// Simulation time, s; NaN for NULL, busy and failed handles.

@@ -239,7 +239,7 @@ fn run(instance: &Instance, references: &[c_uint], k: usize, ty: Type) -> Result
     let (index, port) = instance
         .port(reference, ty)
         .map_err(|why| if why.message.starts_with("no variable") { unknown() } else { why })?;
-    if offset >= port.len() || !fmu::in_fmi2(port) {
+    if offset >= port.len() || !fmu::fits_fmi2(port) {
         return Err(unknown());
     }
     let longest = (port.len() - offset).min(references.len() - k);
@@ -500,8 +500,9 @@ pub unsafe extern "C" fn fmi2DoStep(
 ) -> Status {
     let _ = noSetFMUStatePriorToCurrentPoint;
     let body = |i: &mut Instance2| {
-        let status =
-            i.common.answer(table::DO_STEP, modes::ERROR, |i| i.step(currentCommunicationPoint, communicationStepSize));
+        let status = i
+            .common
+            .answer(table::DO_STEP, modes::ERROR, |i| i.step(currentCommunicationPoint, communicationStepSize, None));
         if status == Status::Discard {
             i.common.mode = modes::STEP_FAILED;
         }
@@ -617,6 +618,27 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
     unsafe { on(c, table::GET_DIRECTIONAL_DERIVATIVE, body) }
 }
 
+/// `fmi2GetRealOutputDerivatives`: velocities of skin and markers (order 1) in scenes with inertia.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    order: *const c_int,
+    value: *mut f64,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of this length, or null.
+        let (references, orders, out) =
+            unsafe { (slice(vr, nvr, "vr")?, slice(order, nvr, "order")?, slice_mut(value, nvr, "value")?) };
+        each_run(i, references, Type::Float64, |i, port, offset, range| {
+            i.time_derivative(port, offset, &orders[range.clone()], &mut out[range])
+        })
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(c, table::GET_REAL_OUTPUT_DERIVATIVES, body) }
+}
+
 /// The ports that scalars belong to, one after another, and where each run of scalars lies among their elements.
 #[derive(Default)]
 struct Whole {
@@ -648,7 +670,6 @@ impl Whole {
 not_offered! {
     fmi2CancelStep(): "no step runs asynchronously";
     fmi2SetRealInputDerivatives(vr: *const c_uint, nvr: usize, order: *const c_int, value: *const f64): "inputs are not interpolated";
-    fmi2GetRealOutputDerivatives(vr: *const c_uint, nvr: usize, order: *const c_int, value: *mut f64): "output derivatives are not provided";
     fmi2EnterEventMode(): "this component offers co-simulation only";
     fmi2NewDiscreteStates(eventInfo: *mut c_void): "this component offers co-simulation only";
     fmi2EnterContinuousTimeMode(): "this component offers co-simulation only";

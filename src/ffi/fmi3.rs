@@ -10,7 +10,7 @@ use std::ffi::{c_char, c_void};
 use std::path::Path;
 
 use super::guard::{self, Handle};
-use super::instance::{Answer, Instance, Instance3, error};
+use super::instance::{Answer, Inside, Instance, Instance3, Readable, Update, error};
 use super::logger::{Callback, Category, LogMessage3, Logger, Status};
 use super::modes::{self, Call, fmi3 as table};
 use super::pointer::{place, slice, slice_mut, text};
@@ -30,8 +30,42 @@ pub type fmi3FMUState = *mut c_void;
 /// `instance` is null or came from an instantiate function here and was not freed.
 unsafe fn on(instance: fmi3Instance, call: Call, body: impl FnOnce(&mut Instance) -> Answer) -> Status {
     // SAFETY: the caller's promise.
-    let status = unsafe { guard::with(instance.cast::<Handle<Instance3>>(), |i| i.0.answer(call, modes::ERROR, body)) };
+    let status =
+        unsafe { guard::with(instance.cast::<Handle<Instance3>>(), |i| i.common.answer(call, modes::ERROR, body)) };
     status.unwrap_or(Status::Error)
+}
+
+/// `fmi3IntermediateUpdateCallback`.
+pub type IntermediateUpdate = unsafe extern "C" fn(
+    *mut c_void,
+    f64,
+    fmi3Boolean,
+    fmi3Boolean,
+    fmi3Boolean,
+    fmi3Boolean,
+    *mut fmi3Boolean,
+    *mut f64,
+);
+
+/// Runs one call that reads variables: on an instance, or, inside the host's intermediate update, on the middle of its step.
+///
+/// # Safety
+/// As for [`on`].
+unsafe fn read(instance: fmi3Instance, call: Call, body: impl FnOnce(&mut dyn Readable) -> Answer) -> Status {
+    // SAFETY: the caller's promise.
+    let view = unsafe { guard::offered(instance.cast::<Handle<Instance3>>()) };
+    if view.is_null() {
+        // SAFETY: the caller's promise.
+        return unsafe { on(instance, call, |i| body(i)) };
+    }
+    // SAFETY: `fmi3DoStep` offers an `Inside` that lives until the host's callback on this thread is over: not before us.
+    let mut inside = unsafe { *view.cast::<Inside>() };
+    let answered = guard::caught(|| {
+        let Err(refusal) = body(&mut inside) else { return Status::Ok };
+        inside.logger.log(refusal.status, Category::Error, &format!("{}: {}", call.name, refusal.message));
+        refusal.status
+    });
+    answered.unwrap_or(Status::Error)
 }
 
 /// Functions that the component does not offer: Error and a line in the log.
@@ -134,15 +168,10 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     nRequiredIntermediateVariables: usize,
     instanceEnvironment: *mut c_void,
     logMessage: Option<LogMessage3>,
-    intermediateUpdate: *const c_void,
+    intermediateUpdate: Option<IntermediateUpdate>,
 ) -> fmi3Instance {
-    let _ = (
-        visible,
-        earlyReturnAllowed,
-        requiredIntermediateVariables,
-        nRequiredIntermediateVariables,
-        intermediateUpdate,
-    );
+    // All variables can be read in an intermediate update, whether they are said to be required or not.
+    let _ = (visible, earlyReturnAllowed, requiredIntermediateVariables, nRequiredIntermediateVariables);
     let opened = guard::caught(|| {
         let logger = Logger::new(logMessage.map_or(Callback::None, Callback::V3), instanceEnvironment, loggingOn != 0);
         let fail = |logger: Logger, why: &str| {
@@ -162,7 +191,10 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
             return fail(logger, "eventModeUsed, but this component has no event mode");
         }
         match Instance::open(token, folder.map(Path::new), logger) {
-            Ok(instance) => Handle::leak(Instance3(instance)).cast(),
+            Ok(common) => {
+                let update = intermediateUpdate.map(|callback| Update { callback, environment: instanceEnvironment });
+                Handle::leak(Instance3 { common, update }).cast()
+            }
             Err((logger, why)) => fail(logger, &why),
         }
     });
@@ -264,10 +296,10 @@ pub unsafe extern "C" fn fmi3Terminate(instance: fmi3Instance) -> Status {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3Reset(instance: fmi3Instance) -> Status {
     let body = |i: &mut Instance3| {
-        if i.0.is_poisoned() {
-            reset_poisoned(&mut i.0)
+        if i.common.is_poisoned() {
+            reset_poisoned(&mut i.common)
         } else {
-            i.0.answer(table::RESET, modes::ERROR, Instance::reset)
+            i.common.answer(table::RESET, modes::ERROR, Instance::reset)
         }
     };
     // SAFETY: the host's promise about its instance.
@@ -293,7 +325,7 @@ pub unsafe extern "C" fn fmi3GetFloat64(
     values: *mut f64,
     nValues: usize,
 ) -> Status {
-    let body = |i: &mut Instance| {
+    let body = |i: &mut dyn Readable| {
         // SAFETY: the host passes arrays of these lengths, or null.
         let (references, out) = unsafe {
             (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
@@ -311,7 +343,7 @@ pub unsafe extern "C" fn fmi3GetFloat64(
         Ok(())
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { on(instance, table::get("fmi3GetFloat64"), body) }
+    unsafe { read(instance, table::get("fmi3GetFloat64"), body) }
 }
 
 /// `fmi3GetFloat32`: a copy, rounded to single precision.
@@ -323,7 +355,7 @@ pub unsafe extern "C" fn fmi3GetFloat32(
     values: *mut f32,
     nValues: usize,
 ) -> Status {
-    let body = |i: &mut Instance| {
+    let body = |i: &mut dyn Readable| {
         // SAFETY: the host passes arrays of these lengths, or null.
         let (references, out) = unsafe {
             (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
@@ -345,7 +377,7 @@ pub unsafe extern "C" fn fmi3GetFloat32(
         Ok(())
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { on(instance, table::get("fmi3GetFloat32"), body) }
+    unsafe { read(instance, table::get("fmi3GetFloat32"), body) }
 }
 
 /// `fmi3GetInt32`: a copy; between steps nothing is computed.
@@ -357,7 +389,7 @@ pub unsafe extern "C" fn fmi3GetInt32(
     values: *mut i32,
     nValues: usize,
 ) -> Status {
-    let body = |i: &mut Instance| {
+    let body = |i: &mut dyn Readable| {
         // SAFETY: the host passes arrays of these lengths, or null.
         let (references, out) = unsafe {
             (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
@@ -374,7 +406,7 @@ pub unsafe extern "C" fn fmi3GetInt32(
         Ok(())
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { on(instance, table::get("fmi3GetInt32"), body) }
+    unsafe { read(instance, table::get("fmi3GetInt32"), body) }
 }
 
 /// `fmi3GetBoolean`: a copy; between steps nothing is computed.
@@ -386,7 +418,7 @@ pub unsafe extern "C" fn fmi3GetBoolean(
     values: *mut fmi3Boolean,
     nValues: usize,
 ) -> Status {
-    let body = |i: &mut Instance| {
+    let body = |i: &mut dyn Readable| {
         // SAFETY: the host passes arrays of these lengths, or null.
         let (references, out) = unsafe {
             (slice(valueReferences, nValueReferences, "valueReferences")?, slice_mut(values, nValues, "values")?)
@@ -404,7 +436,7 @@ pub unsafe extern "C" fn fmi3GetBoolean(
         Ok(())
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { on(instance, table::get("fmi3GetBoolean"), body) }
+    unsafe { read(instance, table::get("fmi3GetBoolean"), body) }
 }
 
 /// `fmi3SetFloat64`: checked as a whole, then written as a whole; nothing is computed.
@@ -512,7 +544,7 @@ fn nothing_settable(n_references: usize, n_values: usize) -> Answer {
 }
 
 /// Float64 variables go through the Float64 functions, those that FMI shows as Float32 through the others.
-fn check_floats(i: &Instance, references: &[u32], single: bool) -> Answer {
+fn check_floats(i: &dyn Readable, references: &[u32], single: bool) -> Answer {
     for &reference in references {
         let (_, port) = i.port(reference, Type::Float64)?;
         if port.single != single {
@@ -524,7 +556,7 @@ fn check_floats(i: &Instance, references: &[u32], single: bool) -> Answer {
 }
 
 /// `nValues` must be the sum of the sizes of all variables named (FMI 3.0.2, section 2.2.7.2).
-fn check_lengths(instance: &Instance, references: &[u32], ty: Type, n_values: usize) -> Answer {
+fn check_lengths(instance: &dyn Readable, references: &[u32], ty: Type, n_values: usize) -> Answer {
     let mut wanted = 0;
     for &reference in references {
         wanted += instance.port(reference, ty)?.1.len();
@@ -656,6 +688,40 @@ pub unsafe extern "C" fn fmi3DeserializeFMUState(
 
 // ---------------------------------------------------------------- derivatives, configuration, clocks, model exchange
 
+/// `fmi3GetOutputDerivatives`: velocities of skin and markers (order 1) in scenes with inertia; one order a variable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetOutputDerivatives(
+    instance: fmi3Instance,
+    valueReferences: *const u32,
+    nValueReferences: usize,
+    orders: *const i32,
+    values: *mut f64,
+    nValues: usize,
+) -> Status {
+    let body = |i: &mut dyn Readable| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (references, orders, out) = unsafe {
+            (
+                slice(valueReferences, nValueReferences, "valueReferences")?,
+                slice(orders, nValueReferences, "orders")?,
+                slice_mut(values, nValues, "values")?,
+            )
+        };
+        check_floats(i, references, false)?;
+        check_lengths(i, references, Type::Float64, out.len())?;
+        let mut rest = out;
+        for (&reference, order) in references.iter().zip(orders) {
+            let (port, n) = i.port(reference, Type::Float64).map(|(k, p)| (k, p.len()))?;
+            let (now, later) = rest.split_at_mut(n);
+            i.time_derivative(port, 0, &[*order], now)?;
+            rest = later;
+        }
+        Ok(())
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { read(instance, table::GET_OUTPUT_DERIVATIVES, body) }
+}
+
 /// `fmi3GetDirectionalDerivative`: one solve with the stiffness of the accepted state.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
@@ -687,8 +753,38 @@ pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
     unsafe { on(instance, table::GET_DIRECTIONAL_DERIVATIVE, body) }
 }
 
+/// `fmi3GetAdjointDerivative`: one solve with the transposed stiffness of the accepted state.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi3GetAdjointDerivative(
+    instance: fmi3Instance,
+    unknowns: *const u32,
+    nUnknowns: usize,
+    knowns: *const u32,
+    nKnowns: usize,
+    seed: *const f64,
+    nSeed: usize,
+    sensitivity: *mut f64,
+    nSensitivity: usize,
+) -> Status {
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (unknowns, knowns, seed, sensitivity) = unsafe {
+            (
+                slice(unknowns, nUnknowns, "unknowns")?,
+                slice(knowns, nKnowns, "knowns")?,
+                slice(seed, nSeed, "seed")?,
+                slice_mut(sensitivity, nSensitivity, "sensitivity")?,
+            )
+        };
+        check_lengths(i, unknowns, Type::Float64, seed.len())?;
+        check_lengths(i, knowns, Type::Float64, sensitivity.len())?;
+        i.adjoint_derivative(unknowns, knowns, seed, sensitivity)
+    };
+    // SAFETY: the host's promise about its instance.
+    unsafe { on(instance, table::GET_ADJOINT_DERIVATIVE, body) }
+}
+
 not_offered! {
-    fmi3GetAdjointDerivative(unknowns: *const u32, nUnknowns: usize, knowns: *const u32, nKnowns: usize, seed: *const f64, nSeed: usize, sensitivity: *mut f64, nSensitivity: usize): "adjoint derivatives are not provided";
     fmi3EnterConfigurationMode(): "there are no structural parameters";
     fmi3ExitConfigurationMode(): "there are no structural parameters";
     fmi3GetIntervalDecimal(valueReferences: *const u32, nValueReferences: usize, intervals: *mut f64, qualifiers: *mut i32): "no variable is a clock";
@@ -712,7 +808,6 @@ not_offered! {
     fmi3GetNumberOfEventIndicators(nEventIndicators: *mut usize): "this component offers co-simulation only";
     fmi3GetNumberOfContinuousStates(nContinuousStates: *mut usize): "this component offers co-simulation only";
     fmi3EnterStepMode(): "this component has no event mode";
-    fmi3GetOutputDerivatives(valueReferences: *const u32, nValueReferences: usize, orders: *const i32, values: *mut f64, nValues: usize): "output derivatives are not provided";
     fmi3ActivateModelPartition(clockReference: u32, activationTime: f64): "this component offers co-simulation only";
 }
 
@@ -738,20 +833,43 @@ pub unsafe extern "C" fn fmi3DoStep(
         }
     }
     let body = |i: &mut Instance3| {
-        let status = i.0.answer(table::DO_STEP, modes::ERROR, |i| {
+        let Instance3 { common, update } = i;
+        let mut watch = update.as_ref().map(|update| {
+            |inside: &Inside| {
+                // SAFETY: we are inside a call on this very handle, on this thread.
+                unsafe {
+                    guard::offering(instance.cast::<Handle<Instance3>>(), (&raw const *inside).cast(), || {
+                        update.tell(inside)
+                    })
+                }
+            }
+        });
+        let status = common.answer(table::DO_STEP, modes::ERROR, |i| {
             if [eventHandlingNeeded, terminateSimulation, earlyReturn].iter().any(|p| p.is_null())
                 || lastSuccessfulTime.is_null()
             {
                 return Err(error("an output argument is NULL"));
             }
-            i.step(currentCommunicationPoint, communicationStepSize)
+            let watch = watch.as_mut().map(|watch| watch as &mut dyn FnMut(&Inside));
+            i.step(currentCommunicationPoint, communicationStepSize, watch)
         });
         // SAFETY: null, or the host's place for a time.
         if let Ok(time) = unsafe { place(lastSuccessfulTime, "") } {
-            *time = i.0.sim.time();
+            *time = common.sim.time();
         }
         status
     };
     // SAFETY: the host's promise about its instance.
     unsafe { guard::with(instance.cast::<Handle<Instance3>>(), body) }.unwrap_or(Status::Error)
+}
+
+impl Update {
+    /// Tells the host of an accepted piece of a step: variables can be read, none can be set, nothing ends early.
+    fn tell(&self, inside: &Inside) {
+        let (mut early, mut time) = (0, 0.0);
+        // SAFETY: the host gave this function and environment at instantiation; both places outlive the call.
+        unsafe {
+            (self.callback)(self.environment, inside.view.time(), 0, 1, 1, 0, &raw mut early, &raw mut time);
+        }
+    }
 }

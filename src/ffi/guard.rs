@@ -5,9 +5,10 @@
 
 use std::any::Any;
 use std::cell::UnsafeCell;
+use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
 
 /// Guarded calls under way. While there is one, the panic hook keeps quiet: its message goes into a handle instead.
 static UNDER_WAY: AtomicUsize = AtomicUsize::new(0);
@@ -24,6 +25,9 @@ pub(super) trait Guarded {
 pub struct Handle<T> {
     tag: u64,
     busy: AtomicBool,
+    /// What the host's own callback may look at while a call is under way, and the thread that it runs on.
+    offered: AtomicPtr<c_void>,
+    thread: AtomicUsize,
     value: UnsafeCell<T>,
 }
 
@@ -43,7 +47,13 @@ pub(super) enum Denied {
 impl<T: Guarded> Handle<T> {
     /// Moves `value` to the heap and gives away its address; [`Handle::free`] takes it back.
     pub(super) fn leak(value: T) -> *mut Handle<T> {
-        Box::into_raw(Box::new(Handle { tag: T::TAG, busy: AtomicBool::new(false), value: UnsafeCell::new(value) }))
+        Box::into_raw(Box::new(Handle {
+            tag: T::TAG,
+            busy: AtomicBool::new(false),
+            offered: AtomicPtr::new(std::ptr::null_mut()),
+            thread: AtomicUsize::new(0),
+            value: UnsafeCell::new(value),
+        }))
     }
 
     /// Drops the value. Null, foreign and busy handles are left alone.
@@ -101,6 +111,40 @@ pub(super) unsafe fn with<T: Guarded, R>(handle: *mut Handle<T>, body: impl FnOn
     });
     this.busy.store(false, Ordering::Release);
     outcome
+}
+
+/// Tells this thread from all others that live.
+fn this_thread() -> usize {
+    thread_local!(static HERE: u8 = const { 0 });
+    HERE.with(|here| std::ptr::from_ref(here) as usize)
+}
+
+/// Runs `callback`, inside which this thread gets `view` from [`offered`].
+///
+/// # Safety
+/// `handle` is live, and a call on it is under way on this thread.
+pub(super) unsafe fn offering<T: Guarded>(handle: *mut Handle<T>, view: *const c_void, callback: impl FnOnce()) {
+    // SAFETY: the caller's promise; only atomics are touched.
+    let this = unsafe { &*handle };
+    this.thread.store(this_thread(), Ordering::Relaxed);
+    this.offered.store(view.cast_mut(), Ordering::Release);
+    callback();
+    this.offered.store(std::ptr::null_mut(), Ordering::Release);
+}
+
+/// What [`offering`] lays open to a callback on this thread; null at any other time and place.
+///
+/// # Safety
+/// As for [`with`].
+pub(super) unsafe fn offered<T: Guarded>(handle: *mut Handle<T>) -> *const c_void {
+    // SAFETY: the caller's promise, as in `enter`: nothing beyond the tag is touched before the tag is known to be ours.
+    if handle.is_null() || !handle.is_aligned() || unsafe { (&raw const (*handle).tag).read() } != T::TAG {
+        return std::ptr::null();
+    }
+    // SAFETY: the tag says that `Handle::leak` made it; only atomics are touched.
+    let this = unsafe { &*handle };
+    let view = this.offered.load(Ordering::Acquire);
+    if !view.is_null() && this.thread.load(Ordering::Relaxed) == this_thread() { view } else { std::ptr::null() }
 }
 
 /// Runs `body`; a panic becomes its message, and prints nothing.

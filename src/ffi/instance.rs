@@ -11,7 +11,7 @@ use super::modes::{self, Call, Mode};
 use super::resources;
 use super::snapshot::Snapshot;
 use crate::port::{Causality, Port, Type};
-use crate::sim::{Sim, StepReport};
+use crate::sim::{Model, Sim, StepReport, View};
 
 /// Communication points may differ from the instance's time by this, relative to the larger of time and step: ten
 /// steps of 0.1 add up to 0.9999999999999999.
@@ -147,7 +147,7 @@ impl Instance {
     }
 
     /// Advances from `at` by `dt`, s. A step that fails leaves everything as it was and is a Discard.
-    pub(super) fn step(&mut self, at: f64, dt: f64) -> Answer {
+    pub(super) fn step(&mut self, at: f64, dt: f64, watch: Option<&mut dyn FnMut(&Inside)>) -> Answer {
         if !(dt.is_finite() && dt > 0.0) {
             return Err(error(format!("communication step size {dt} is not positive and finite")));
         }
@@ -160,7 +160,12 @@ impl Instance {
         if let Some(stop) = self.stop.filter(|&stop| t + dt > stop + TIME_ROUNDING * stop.abs().max(dt)) {
             return Err(error(format!("step from {t} by {dt} passes the stop time {stop}")));
         }
-        let report = self.sim.step(dt).map_err(|why| discard(chain(&why)))?;
+        let Self { sim, logger, .. } = self;
+        let stepped = match watch {
+            Some(watch) => sim.step_watched(dt, &mut |view| watch(&Inside { view, logger })),
+            None => sim.step(dt),
+        };
+        let report = stepped.map_err(|why| discard(chain(&why)))?;
         self.tell("step", &report);
         Ok(())
     }
@@ -207,17 +212,7 @@ impl Instance {
 
     /// The port that a host means by an FMI 3.0 value reference.
     pub(super) fn port(&self, reference: u32, ty: Type) -> Result<(usize, &Port), Refusal> {
-        let ports = self.sim.model().ports();
-        let found = ports
-            .binary_search_by_key(&reference, |p| p.reference)
-            .ok()
-            .map(|i| (i, &ports[i]))
-            .filter(|(_, p)| !p.is_empty());
-        let (i, port) = found.ok_or_else(|| error(format!("no variable has value reference {reference}")))?;
-        if port.ty != ty {
-            return Err(error(format!("`{}` (value reference {reference}) is {:?}, not {ty:?}", port.name, port.ty)));
-        }
-        Ok((i, port))
+        port(self.sim.model(), reference, ty)
     }
 
     /// Brings outputs up to date where the standard wants it: in Initialization Mode, when `port` is computed from
@@ -235,7 +230,7 @@ impl Instance {
     /// Whether `values` may be written to `port` from element `offset` on, in this mode.
     pub(super) fn check_set(&self, port: &Port, offset: usize, values: &[f64]) -> Answer {
         let legal = match port.causality {
-            Causality::Input => modes::INSTANTIATED | modes::INITIALIZATION | modes::STEP,
+            Causality::Input | Causality::TunableParameter => modes::INSTANTIATED | modes::INITIALIZATION | modes::STEP,
             Causality::Parameter => modes::INSTANTIATED | modes::INITIALIZATION,
             Causality::Independent | Causality::Output | Causality::CalculatedParameter => 0,
         };
@@ -283,14 +278,38 @@ impl Instance {
         seed: &[f64],
         sensitivity: &mut [f64],
     ) -> Answer {
+        let (unknowns, knowns) = self.before_derivative(unknowns, knowns)?;
+        self.sim.directional_derivative(&knowns, seed, &unknowns, sensitivity).map_err(|why| error(chain(&why)))
+    }
+
+    /// First derivatives by time of elements of an output; no other order is known.
+    pub(super) fn time_derivative(&self, port: usize, offset: usize, orders: &[i32], out: &mut [f64]) -> Answer {
+        check_orders(orders)?;
+        self.sim.time_derivative(port, offset, out).map_err(|why| error(chain(&why)))
+    }
+
+    /// Gradient of the unknowns weighted by `seed`, as [`Instance::directional_derivative`] transposed.
+    pub(super) fn adjoint_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        sensitivity: &mut [f64],
+    ) -> Answer {
+        let (unknowns, knowns) = self.before_derivative(unknowns, knowns)?;
+        self.sim.adjoint_derivative(&unknowns, seed, &knowns, sensitivity).map_err(|why| error(chain(&why)))
+    }
+
+    /// Ports of unknowns and knowns, with outputs brought up to date.
+    fn before_derivative(&mut self, unknowns: &[u32], knowns: &[u32]) -> Result<(Vec<usize>, Vec<usize>), Refusal> {
         let ports = |references: &[u32]| -> Result<Vec<usize>, Refusal> {
             references.iter().map(|&r| Ok(self.port(r, Type::Float64)?.0)).collect()
         };
         let (unknowns, knowns) = (ports(unknowns)?, ports(knowns)?);
-        if let Some(&port) = unknowns.first() {
+        for &port in &unknowns {
             self.before_get(port)?;
         }
-        self.sim.directional_derivative(&knowns, seed, &unknowns, sensitivity).map_err(|why| error(chain(&why)))
+        Ok((unknowns, knowns))
     }
 
     pub(super) fn get_i32(&self, port: usize, offset: usize, out: &mut [i32]) -> Answer {
@@ -369,6 +388,99 @@ impl Instance {
     }
 }
 
+fn port(model: &Model, reference: u32, ty: Type) -> Result<(usize, &Port), Refusal> {
+    let ports = model.ports();
+    let found = ports
+        .binary_search_by_key(&reference, |p| p.reference)
+        .ok()
+        .map(|i| (i, &ports[i]))
+        .filter(|(_, p)| !p.is_empty());
+    let (i, port) = found.ok_or_else(|| error(format!("no variable has value reference {reference}")))?;
+    if port.ty != ty {
+        return Err(error(format!("`{}` (value reference {reference}) is {:?}, not {ty:?}", port.name, port.ty)));
+    }
+    Ok((i, port))
+}
+
+fn check_orders(orders: &[i32]) -> Answer {
+    match orders.iter().find(|&&order| order != 1) {
+        Some(order) => Err(error(format!("output derivatives of order {order} are not known, only those of order 1"))),
+        None => Ok(()),
+    }
+}
+
+/// What variables can be read from: an instance, or the middle of one of its steps.
+pub(super) trait Readable {
+    /// The model whose ports are read.
+    fn model(&self) -> &Model;
+    /// Before an output is read: brings it up to date where the standard wants it.
+    fn before_get(&mut self, port: usize) -> Answer;
+    /// Elements of a Float64 port, from `offset` on.
+    fn get_f64(&self, port: usize, offset: usize, out: &mut [f64]) -> Answer;
+    /// Elements of an Int32 port, from `offset` on.
+    fn get_i32(&self, port: usize, offset: usize, out: &mut [i32]) -> Answer;
+    /// One truth value.
+    fn get_bool(&self, port: usize, offset: usize) -> Result<bool, Refusal>;
+    /// First derivatives by time of elements of an output; no other order is known.
+    fn time_derivative(&self, port: usize, offset: usize, orders: &[i32], out: &mut [f64]) -> Answer;
+    /// The port that a host means by an FMI 3.0 value reference.
+    fn port(&self, reference: u32, ty: Type) -> Result<(usize, &Port), Refusal> {
+        port(self.model(), reference, ty)
+    }
+}
+
+impl Readable for Instance {
+    fn model(&self) -> &Model {
+        self.sim.model()
+    }
+    fn before_get(&mut self, port: usize) -> Answer {
+        Instance::before_get(self, port)
+    }
+    fn get_f64(&self, port: usize, offset: usize, out: &mut [f64]) -> Answer {
+        Instance::get_f64(self, port, offset, out)
+    }
+    fn get_i32(&self, port: usize, offset: usize, out: &mut [i32]) -> Answer {
+        Instance::get_i32(self, port, offset, out)
+    }
+    fn get_bool(&self, port: usize, offset: usize) -> Result<bool, Refusal> {
+        Instance::get_bool(self, port, offset)
+    }
+    fn time_derivative(&self, port: usize, offset: usize, orders: &[i32], out: &mut [f64]) -> Answer {
+        Instance::time_derivative(self, port, offset, orders, out)
+    }
+}
+
+/// The middle of a step, as the host's intermediate update sees it.
+#[derive(Clone, Copy)]
+pub(super) struct Inside<'a> {
+    pub(super) view: &'a View<'a>,
+    pub(super) logger: &'a Logger,
+}
+
+impl Readable for Inside<'_> {
+    fn model(&self) -> &Model {
+        self.view.model()
+    }
+    fn before_get(&mut self, _port: usize) -> Answer {
+        Ok(())
+    }
+    fn get_f64(&self, port: usize, offset: usize, out: &mut [f64]) -> Answer {
+        self.view.get_f64(port, offset, out).map_err(|why| error(chain(&why)))
+    }
+    fn get_i32(&self, port: usize, offset: usize, out: &mut [i32]) -> Answer {
+        self.view.get_i32(port, offset, out).map_err(|why| error(chain(&why)))
+    }
+    fn get_bool(&self, port: usize, offset: usize) -> Result<bool, Refusal> {
+        let mut out = [false];
+        self.view.get_bool(port, offset, &mut out).map_err(|why| error(chain(&why)))?;
+        Ok(out[0])
+    }
+    fn time_derivative(&self, port: usize, offset: usize, orders: &[i32], out: &mut [f64]) -> Answer {
+        check_orders(orders)?;
+        self.view.time_derivative(port, offset, out).map_err(|why| error(chain(&why)))
+    }
+}
+
 /// An error and its sources in one line.
 pub(super) fn chain(why: &dyn std::error::Error) -> String {
     let mut text = why.to_string();
@@ -384,7 +496,17 @@ pub(super) fn chain(why: &dyn std::error::Error) -> String {
 }
 
 /// An instance made through the FMI 3.0 functions.
-pub(super) struct Instance3(pub(super) Instance);
+pub(super) struct Instance3 {
+    pub(super) common: Instance,
+    /// The host's intermediate update, if it has one.
+    pub(super) update: Option<Update>,
+}
+
+/// `fmi3IntermediateUpdateCallback` with the host's environment.
+pub(super) struct Update {
+    pub(super) callback: super::fmi3::IntermediateUpdate,
+    pub(super) environment: *mut std::ffi::c_void,
+}
 
 /// An instance made through the FMI 2.0 functions.
 pub(super) struct Instance2 {
@@ -396,7 +518,7 @@ pub(super) struct Instance2 {
 impl Guarded for Instance3 {
     const TAG: u64 = u64::from_le_bytes(*b"cutisFM3");
     fn poison(&mut self, why: String) {
-        self.0.poison(why);
+        self.common.poison(why);
     }
 }
 

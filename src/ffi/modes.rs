@@ -70,7 +70,9 @@ pub(super) mod fmi3 {
     pub const SERIALIZED_FMU_STATE_SIZE: Call = call("fmi3SerializedFMUStateSize", ANY);
     pub const SERIALIZE_FMU_STATE: Call       = call("fmi3SerializeFMUState", ANY);
     pub const DESERIALIZE_FMU_STATE: Call     = call("fmi3DeserializeFMUState", ANY);
-    pub const GET_DIRECTIONAL_DERIVATIVE: Call = call("fmi3GetDirectionalDerivative", INITIALIZATION | STEP);
+    pub const GET_DIRECTIONAL_DERIVATIVE: Call = call("fmi3GetDirectionalDerivative", INITIALIZATION | STEP | TERMINATED);
+    pub const GET_ADJOINT_DERIVATIVE: Call    = call("fmi3GetAdjointDerivative", INITIALIZATION | STEP | TERMINATED);
+    pub const GET_OUTPUT_DERIVATIVES: Call    = call("fmi3GetOutputDerivatives", STEP | TERMINATED);
     pub const fn get(name: &'static str) -> Call { call(name, GET) }
     pub const fn set(name: &'static str) -> Call { call(name, SET) }
 }
@@ -94,7 +96,8 @@ pub(super) mod fmi2 {
     pub const SERIALIZED_FMU_STATE_SIZE: Call = call("fmi2SerializedFMUstateSize", ANY);
     pub const SERIALIZE_FMU_STATE: Call       = call("fmi2SerializeFMUstate", ANY);
     pub const DESERIALIZE_FMU_STATE: Call     = call("fmi2DeSerializeFMUstate", ANY);
-    pub const GET_DIRECTIONAL_DERIVATIVE: Call = call("fmi2GetDirectionalDerivative", INITIALIZATION | STEP);
+    pub const GET_DIRECTIONAL_DERIVATIVE: Call = call("fmi2GetDirectionalDerivative", INITIALIZATION | STEP | TERMINATED);
+    pub const GET_REAL_OUTPUT_DERIVATIVES: Call = call("fmi2GetRealOutputDerivatives", STEP | STEP_FAILED | TERMINATED | ERROR);
     pub const STATUS: Mode                    = STEP | STEP_FAILED | TERMINATED | ERROR;
     pub const fn get(name: &'static str) -> Call { call(name, GET) }
     pub const fn set(name: &'static str) -> Call { call(name, SET) }

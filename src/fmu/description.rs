@@ -19,16 +19,16 @@ pub fn description(scene: &Loaded, version: FmiVersion) -> String {
     let Loaded { model, programme } = scene;
     let ports: Vec<&Port> = model.ports().iter().filter(|p| version.has(p)).collect();
     let mut root: Attributes = vec![
-        ("fmiVersion", if version == FmiVersion::V3 { "3.0" } else { "2.0" }.to_owned()),
+        ("fmiVersion", if version.is_3() { "3.0" } else { "2.0" }.to_owned()),
         ("modelName", model.name().to_owned()),
-        (if version == FmiVersion::V3 { "instantiationToken" } else { "guid" }, model.token().to_owned()),
+        (if version.is_3() { "instantiationToken" } else { "guid" }, model.token().to_owned()),
         ("description", "Soft tissue of the human face: bones move in, skin moves out".to_owned()),
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("license", env!("CARGO_PKG_LICENSE").to_owned()),
         ("generationTool", concat!("cutis ", env!("CARGO_PKG_VERSION")).to_owned()),
         ("variableNamingConvention", "structured".to_owned()),
     ];
-    if version == FmiVersion::V2 {
+    if !version.is_3() {
         root.push(("numberOfEventIndicators", "0".to_owned()));
     }
     document("fmiModelDescription", root, |xml| {
@@ -49,7 +49,7 @@ pub fn description(scene: &Loaded, version: FmiVersion) -> String {
                 element(xml, "ModelVariables", vec![], |xml| ports.iter().for_each(|p| variable3(xml, p, &types)));
                 structure3(xml, &ports);
             }
-            FmiVersion::V2 => {
+            FmiVersion::V2 | FmiVersion::V2Full => {
                 element(xml, "ModelVariables", vec![], |xml| ports.iter().for_each(|p| variables2(xml, p, &types)));
                 structure2(xml, &ports);
             }
@@ -57,19 +57,43 @@ pub fn description(scene: &Loaded, version: FmiVersion) -> String {
     })
 }
 
-/// The terminals of the FMI 3.0 archive: one bus for the inputs and outputs whose names begin alike (`bone`, `skin`).
-pub fn terminals(model: &Model) -> String {
+/// Terminals: group of names, name, matching rule, what it is. Groups that are not listed become buses of their own name.
+const TERMINALS: &[(&str, &str, &str, &str)] = &[
+    ("bone", "bones", "plug", "Bones: how they are moved, and what the tissue does to them"),
+    ("load", "loads", "bus", "Forces and pressures on the skin"),
+    ("marker", "markers", "bus", "Points that ride on the skin"),
+    ("material", "materials", "bus", "Stiffness of the tissues"),
+    ("muscle", "muscles", "bus", "Activation of the muscles"),
+    ("skin", "skin", "bus", "The skin: where it is, where it was at rest, how its vertices are joined"),
+];
+
+/// The terminals and the icon of the FMI 3.0 archive: one terminal for the variables whose names begin alike.
+pub fn terminals(model: &Model, icon: bool) -> String {
     let mut groups: BTreeMap<&str, Vec<(&str, &Port)>> = BTreeMap::new();
-    let signals = |p: &&Port| FmiVersion::V3.has(p) && matches!(p.causality, Causality::Input | Causality::Output);
+    let signals = |p: &&Port| FmiVersion::V3.has(p) && p.causality != Causality::Independent;
     for port in model.ports().iter().filter(signals) {
         if let Some((group, member)) = port.name.split_once('.') {
             groups.entry(group).or_default().push((member, port));
         }
     }
     document("fmiTerminalsAndIcons", vec![("fmiVersion", "3.0".to_owned())], |xml| {
+        if icon {
+            element(xml, "GraphicalRepresentation", vec![], |xml| {
+                let corners =
+                    || [("x1", "-100"), ("y1", "-100"), ("x2", "100"), ("y2", "100")].map(|(k, v)| (k, v.to_owned()));
+                let mut system = corners().to_vec();
+                system.push(("suggestedScalingFactorTo_mm", "0.1".to_owned()));
+                empty(xml, "CoordinateSystem", system);
+                empty(xml, "Icon", corners().to_vec());
+            });
+        }
         element(xml, "Terminals", vec![], |xml| {
             for (group, members) in groups {
-                element(xml, "Terminal", vec![("name", group.to_owned()), ("matchingRule", "bus".to_owned())], |xml| {
+                let listed = TERMINALS.iter().find(|t| t.0 == group);
+                let (name, rule) = listed.map_or((group, "bus"), |&(_, name, rule, _)| (name, rule));
+                let mut attributes = vec![("name", name.to_owned()), ("matchingRule", rule.to_owned())];
+                attributes.extend(listed.map(|t| ("description", t.3.to_owned())));
+                element(xml, "Terminal", attributes, |xml| {
                     for (member, port) in members {
                         let attributes = vec![
                             ("variableName", port.name.clone()),
@@ -87,7 +111,7 @@ pub fn terminals(model: &Model) -> String {
 fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
     let claims: &[&'static str] = match version {
         FmiVersion::V3 => &["canHandleVariableCommunicationStepSize", "canGetAndSetFMUState", "canSerializeFMUState"],
-        FmiVersion::V2 => &[
+        FmiVersion::V2 | FmiVersion::V2Full => &[
             "canHandleVariableCommunicationStepSize",
             "canNotUseMemoryManagementFunctions",
             "canGetAndSetFMUstate",
@@ -97,11 +121,17 @@ fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
     let mut attributes: Attributes = vec![("modelIdentifier", MODEL_IDENTIFIER.to_owned())];
     attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
     if model.has_derivatives() {
-        let claim = match version {
-            FmiVersion::V3 => "providesDirectionalDerivatives",
-            FmiVersion::V2 => "providesDirectionalDerivative",
+        let claims: &[&'static str] = match version {
+            FmiVersion::V3 => &["providesDirectionalDerivatives", "providesAdjointDerivatives"],
+            FmiVersion::V2 | FmiVersion::V2Full => &["providesDirectionalDerivative"],
         };
-        attributes.push((claim, "true".to_owned()));
+        attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
+    }
+    if version.is_3() {
+        attributes.push(("providesIntermediateUpdate", "true".to_owned()));
+    }
+    if model.parts().inertia.is_some() {
+        attributes.push(("maxOutputDerivativeOrder", "1".to_owned()));
     }
     empty(xml, "CoSimulation", attributes);
 }
@@ -209,9 +239,11 @@ impl Types {
                         attributes.insert(0, ("name", definition.name.clone()));
                         empty(xml, if definition.single { "Float32Type" } else { "Float64Type" }, attributes);
                     }
-                    FmiVersion::V2 => element(xml, "SimpleType", vec![("name", definition.name.clone())], |xml| {
-                        empty(xml, "Real", attributes)
-                    }),
+                    FmiVersion::V2 | FmiVersion::V2Full => {
+                        element(xml, "SimpleType", vec![("name", definition.name.clone())], |xml| {
+                            empty(xml, "Real", attributes)
+                        })
+                    }
                 }
             }
         });
@@ -225,7 +257,7 @@ fn causality(port: &Port) -> &'static str {
         Causality::Independent => "independent",
         Causality::Input => "input",
         Causality::Output => "output",
-        Causality::Parameter => "parameter",
+        Causality::Parameter | Causality::TunableParameter => "parameter",
         Causality::CalculatedParameter => "calculatedParameter",
     }
 }
@@ -233,6 +265,7 @@ fn causality(port: &Port) -> &'static str {
 fn variability(port: &Port) -> &'static str {
     match (port.causality, port.ty) {
         (Causality::Parameter | Causality::CalculatedParameter, _) => "fixed",
+        (Causality::TunableParameter, _) => "tunable",
         (_, Type::Float64) => "continuous",
         (_, Type::Int32 | Type::Boolean) => "discrete",
     }
@@ -321,15 +354,16 @@ fn variables2(xml: &mut Xml, port: &Port, types: &Types) {
 
 // ---------------------------------------------------------------- structure
 
-/// Outputs depend on every input, and in the beginning on the parameters too: a body in equilibrium feels all of them.
+/// Outputs depend on every input and tunable parameter, and in the beginning on the other parameters too: a body in
+/// equilibrium feels all of them.
 fn structure3(xml: &mut Xml, ports: &[&Port]) {
     let references = |wanted: &[Causality]| -> String {
         let found: Vec<String> =
             ports.iter().filter(|p| wanted.contains(&p.causality)).map(|p| p.reference.to_string()).collect();
         found.join(" ")
     };
-    let inputs = references(&[Causality::Input]);
-    let knowns = references(&[Causality::Input, Causality::Parameter]);
+    let inputs = references(&[Causality::Input, Causality::TunableParameter]);
+    let knowns = references(&[Causality::Input, Causality::TunableParameter, Causality::Parameter]);
     element(xml, "ModelStructure", vec![], |xml| {
         for port in ports.iter().filter(|p| p.causality == Causality::Output) {
             empty(
@@ -377,7 +411,7 @@ fn structure2(xml: &mut Xml, ports: &[&Port]) {
 
 // ---------------------------------------------------------------- XML, in memory
 
-fn document(root: &'static str, attributes: Attributes, body: impl FnOnce(&mut Xml)) -> String {
+pub(super) fn document(root: &'static str, attributes: Attributes, body: impl FnOnce(&mut Xml)) -> String {
     let mut xml = Writer::new_with_indent(b"<?xml version=\"1.0\" encoding=\"UTF-8\"?>".to_vec(), b' ', 2);
     // The first element after a text needs its own line break.
     xml.get_mut().push(b'\n');
@@ -396,7 +430,7 @@ fn element(xml: &mut Xml, name: &'static str, attributes: Attributes, body: impl
     written.map(drop).expect("writing to memory does not fail");
 }
 
-fn empty(xml: &mut Xml, name: &'static str, attributes: Attributes) {
+pub(super) fn empty(xml: &mut Xml, name: &'static str, attributes: Attributes) {
     let attributes = attributes.iter().map(|(key, value)| (*key, value.as_str()));
     xml.create_element(name)
         .with_attributes(attributes)

@@ -3,13 +3,17 @@
 //! ```text
 //! Port table --> description --> modelDescription.xml (3.0 with arrays, 2.0 with scalars)
 //!                terminals, documentation
-//!            +-> package     --> cutis.fmu, cutis_fmi2.fmu (same library inside)
+//!            +-> package     --> cutis.fmu, cutis_fmi2.fmu, cutis_fmi2_full.fmu (same library inside)
+//! model      --> picture (icon), reference (a short run), licenses (SPDX)
 //! ```
 #![forbid(unsafe_code)]
 
 mod description;
 mod documentation;
+mod licenses;
 mod package;
+mod picture;
+mod reference;
 
 pub use description::{description, terminals};
 pub use documentation::documentation;
@@ -25,6 +29,8 @@ pub const MODEL_IDENTIFIER: &str = "cutis";
 pub enum FmiVersion {
     /// FMI 2.0: scalars; bones, loads, markers and diagnostics.
     V2,
+    /// FMI 2.0 with a scalar for every coordinate of the skin, too.
+    V2Full,
     /// FMI 3.0: arrays; everything.
     V3,
 }
@@ -34,6 +40,7 @@ impl FmiVersion {
     pub fn archive_name(self) -> &'static str {
         match self {
             FmiVersion::V2 => "cutis_fmi2.fmu",
+            FmiVersion::V2Full => "cutis_fmi2_full.fmu",
             FmiVersion::V3 => "cutis.fmu",
         }
     }
@@ -41,9 +48,15 @@ impl FmiVersion {
     /// Whether the archive of this version has the port.
     pub fn has(self, port: &Port) -> bool {
         match self {
-            FmiVersion::V2 => in_fmi2(port),
+            FmiVersion::V2 => fits_fmi2(port) && !is_skin(port),
+            FmiVersion::V2Full => fits_fmi2(port),
             FmiVersion::V3 => !port.is_empty(),
         }
+    }
+
+    /// Whether it is FMI 3.0.
+    pub fn is_3(self) -> bool {
+        self == FmiVersion::V3
     }
 }
 
@@ -98,12 +111,17 @@ pub fn scalar_name(port: &Port, offset: usize) -> String {
     format!("{}[{}]", port.name, indices.join(","))
 }
 
-/// Whether the FMI 2.0 archive has this port. The skin arrays stay out: one scalar for each coordinate makes importers
-/// crawl, and markers tell what a host without arrays can use.
-pub fn in_fmi2(port: &Port) -> bool {
-    let skin =
-        matches!(port.slot, Slot::SkinPosition | Slot::SkinVelocity | Slot::SkinRestPosition | Slot::SkinTriangles);
-    !skin && !port.is_empty() && port.len() <= 1 << ELEMENT_BITS && port.reference < 1 << (32 - ELEMENT_BITS)
+/// Whether elements of this port have FMI 2.0 value references. Topology and the skin at rest have none: the former is no
+/// number that a host without arrays could use, the latter is the skin before the first step.
+pub fn fits_fmi2(port: &Port) -> bool {
+    let fixed = matches!(port.slot, Slot::SkinRestPosition | Slot::SkinTriangles);
+    !fixed && !port.is_empty() && port.len() <= 1 << ELEMENT_BITS && port.reference < 1 << (32 - ELEMENT_BITS)
+}
+
+/// The skin arrays stay out of the small archive: one scalar for each coordinate makes importers crawl, and markers tell
+/// what a host without arrays can use.
+fn is_skin(port: &Port) -> bool {
+    matches!(port.slot, Slot::SkinPosition | Slot::SkinVelocity)
 }
 
 #[cfg(test)]

@@ -5,7 +5,11 @@ use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use super::{FmiVersion, MODEL_IDENTIFIER, description, documentation, terminals};
+use std::sync::Arc;
+
+use super::picture::picture;
+use super::reference::{self, FOLDER};
+use super::{FmiVersion, MODEL_IDENTIFIER, description, documentation, licenses, terminals};
 use crate::load::{Baked, Loaded};
 
 /// Why an archive was not written.
@@ -23,15 +27,21 @@ pub enum PackageError {
     /// The archive could not be put together.
     #[error("the archive could not be written")]
     Io(#[from] std::io::Error),
+    /// What goes into the archive cannot be loaded again.
+    #[error(transparent)]
+    Scene(#[from] crate::error::Error),
+    /// The scene's own programme fails in its first steps.
+    #[error("the reference run of the component fails, so it would be of no use to a host: {0}")]
+    Reference(#[from] crate::sim::SimError),
 }
 
 /// Folder of this platform's library inside an archive, for example `x86_64-linux` or, in FMI 2.0, `linux64`.
 pub fn platform(version: FmiVersion) -> String {
     let os = if std::env::consts::OS == "macos" { "darwin" } else { std::env::consts::OS };
     match (version, std::env::consts::ARCH, os) {
-        (FmiVersion::V2, "x86_64", "linux") => "linux64".to_owned(),
-        (FmiVersion::V2, "x86_64", "windows") => "win64".to_owned(),
-        (FmiVersion::V2, "x86_64", "darwin") => "darwin64".to_owned(),
+        (FmiVersion::V2 | FmiVersion::V2Full, "x86_64", "linux") => "linux64".to_owned(),
+        (FmiVersion::V2 | FmiVersion::V2Full, "x86_64", "windows") => "win64".to_owned(),
+        (FmiVersion::V2 | FmiVersion::V2Full, "x86_64", "darwin") => "darwin64".to_owned(),
         (_, arch, os) => format!("{arch}-{os}"),
     }
 }
@@ -39,7 +49,8 @@ pub fn platform(version: FmiVersion) -> String {
 /// The archive of `scene`: `baked` goes into resources, `binary` is this platform's shared library.
 ///
 /// # Errors
-/// [`PackageError::NoLibrary`] without a library; others only where memory ends.
+/// [`PackageError::NoLibrary`] without a library, [`PackageError::Reference`] for a scene that cannot be run (FMI 3.0);
+/// others only where memory ends.
 pub fn package(scene: &Loaded, baked: &Baked, binary: &[u8], version: FmiVersion) -> Result<Vec<u8>, PackageError> {
     let folder = platform(version);
     if binary.is_empty() {
@@ -49,15 +60,28 @@ pub fn package(scene: &Loaded, baked: &Baked, binary: &[u8], version: FmiVersion
     let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::new())));
     archive.add("modelDescription.xml", 0o644, description(scene, version).as_bytes())?;
     archive.add(&library, 0o755, binary)?;
-    archive.add("documentation/index.html", 0o644, documentation(&scene.model, version).as_bytes())?;
+    let picture = picture(&scene.model);
+    let page = documentation(&scene.model, version, picture.is_some());
+    archive.add("documentation/index.html", 0o644, page.as_bytes())?;
+    if let Some(picture) = &picture {
+        archive.add("documentation/picture.png", 0o644, picture)?;
+        let icon = if version.is_3() { "terminalsAndIcons/icon.png" } else { "model.png" };
+        archive.add(icon, 0o644, picture)?;
+    }
     archive.add("documentation/licenses/license.txt", 0o644, LICENSE.as_bytes())?;
     archive.add("documentation/licenses/LICENSE-APACHE", 0o644, include_bytes!("../../LICENSE-APACHE"))?;
     archive.add("documentation/licenses/LICENSE-MIT", 0o644, include_bytes!("../../LICENSE-MIT"))?;
-    archive.add("documentation/licenses/third-party.txt", 0o644, include_bytes!("../../fmu/third-party.txt"))?;
+    archive.add("documentation/licenses/third-party.txt", 0o644, licenses::LIST.as_bytes())?;
+    archive.add("documentation/licenses/license.spdx", 0o644, licenses::spdx(scene.model.token()).as_bytes())?;
     archive.add("resources/model.cutis", 0o644, &baked.mesh)?;
     archive.add("resources/scene.toml", 0o644, baked.scene.as_bytes())?;
-    if version == FmiVersion::V3 {
-        archive.add("terminalsAndIcons/terminalsAndIcons.xml", 0o644, terminals(&scene.model).as_bytes())?;
+    if version.is_3() {
+        let terminals = terminals(&scene.model, picture.is_some());
+        archive.add("terminalsAndIcons/terminalsAndIcons.xml", 0o644, terminals.as_bytes())?;
+        let run = reference::run(Arc::new(baked.load()?.model), &scene.programme)?;
+        archive.add(&format!("{FOLDER}/fmi-ls-manifest.xml"), 0o644, reference::manifest().as_bytes())?;
+        archive.add(&format!("{FOLDER}/cutis_in.csv"), 0o644, run.inputs.as_bytes())?;
+        archive.add(&format!("{FOLDER}/cutis_out.csv"), 0o644, run.outputs.as_bytes())?;
     }
     Ok(archive.0.finish()?.into_inner())
 }
@@ -65,7 +89,7 @@ pub fn package(scene: &Loaded, baked: &Baked, binary: &[u8], version: FmiVersion
 const LICENSE: &str = "This component is licensed under either of the MIT license (LICENSE-MIT) or the Apache license 2.0 (LICENSE-APACHE),
 at your option. SPDX: MIT OR Apache-2.0
 
-The libraries inside it and their licenses are listed in third-party.txt.
+The libraries inside it and their licenses are listed in third-party.txt, and as SPDX in license.spdx.
 ";
 
 struct Archive(ZipWriter<Cursor<Vec<u8>>>);

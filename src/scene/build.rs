@@ -109,15 +109,16 @@ impl Builder<'_> {
             }
             None => None,
         };
-        let Tissue { mut terms, density, n_history } = self.tissue(file, &mesh, &midsides, &mut warnings)?;
+        let Tissue { mut terms, density, n_history, tunable } = self.tissue(file, &mesh, &midsides, &mut warnings)?;
         let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
         let mut bones = self.bones(bone, &mesh, rings)?;
         if rings > 0 {
             free_rings(&mesh, &mut bones, rings, &mut warnings);
         }
         let counts: Vec<(Drive, usize)> = bones.iter().map(|b| (b.drive, b.nodes.len())).collect();
-        let layout = Layout::new(&counts, muscle.len(), load.len(), pressure.len(), gravity.is_some());
+        let layout = Layout::new(tunable.len(), &counts, muscle.len(), load.len(), pressure.len(), gravity.is_some());
         let mut start = vec![0.0; layout.len()];
+        start.iter_mut().zip(&tunable).for_each(|(start, (_, E))| *start = *E);
         self.bone_starts(bone, &bones, &mesh, &layout, &mut start)?;
 
         let muscles = self.text.names("muscle", muscle.iter().map(|m| &m.name))?;
@@ -210,6 +211,7 @@ impl Builder<'_> {
             midsides,
             embedding,
             bones,
+            tunable: tunable.into_iter().map(|(name, _)| name).collect(),
             muscles,
             loads,
             pressures,

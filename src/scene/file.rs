@@ -99,6 +99,7 @@ pub struct TissueSpec {
     pub grade: Option<GradeSpec>,
     pub limit: Option<LimitSpec>,
     pub tension: Option<TensionSpec>,
+    pub tunable: Option<Spanned<String>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -183,6 +184,7 @@ impl TissueSpec {
             grade: _,
             limit: _,
             tension: _,
+            tunable: _,
         } = self;
         [
             ("E", E),

@@ -145,6 +145,7 @@ pub const KEYS: &[Key] = &[
     key("tissue", "grade", "table", "", Any, "none", "Stiffness that changes from the skin to the bones."),
     key("tissue", "limit", "table", "", Any, "none", "Stretches beyond which the tissue stiffens steeply."),
     key("tissue", "tension", "table", "", Any, "none", "Tension in the plane of the skin that the shape at rest carries."),
+    key("tissue", "tunable", "string", "", Any, "none", "Name of a parameter `material.<name>.E` (Pa), Young's modulus at small strain, that a host may set at any communication point; the law's moduli, its damping, overstress and default limits follow in proportion, fibres and tension stay."),
     key("tissue.viscous", "g", "array of floats", "", Positive, "required", "Share of each branch, in units of the law's own stiffness under slow loads."),
     key("tissue.viscous", "tau", "array of floats", "s", Positive, "required", "Relaxation time of each branch."),
     key("tissue.fibre", "direction", "[float; 3]", "", Any, "none", "Mean direction of the fibres; exactly one of `direction` and `path`."),

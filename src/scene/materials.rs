@@ -8,11 +8,12 @@ use super::check::Text;
 use super::file::{BoneSpec, MuscleSpec, SceneFile, TissueSpec, ViscousSpec};
 use super::keys::find;
 use super::tissue::{Fields, Terms};
-use crate::effect::{self, Elements, Law, Muscle, Springs, nearest_on_path, springs};
+use crate::effect::{self, Elements, Law, Muscle, Springs, Tuning, nearest_on_path, springs};
 use crate::energy::Lame;
 use crate::fem::{OnElements, Term};
 use crate::math::Vec3;
 use crate::mesh::TetMesh;
+use crate::sim::MOST_TUNABLE;
 
 /// Above this Poisson's ratio linear tetrahedra lock visibly.
 const LOCKING_NU: f64 = 0.45;
@@ -25,6 +26,8 @@ pub(super) struct Tissue {
     /// By region, kg/m3.
     pub density: Vec<f64>,
     pub n_history: usize,
+    /// Names and Young's moduli (Pa) of the tissues whose stiffness can be set; the inputs begin with them.
+    pub tunable: Vec<(String, f64)>,
 }
 
 /// What a tissue is to small strains.
@@ -109,10 +112,23 @@ impl Builder<'_> {
         let beta = file.inertia.as_ref().and_then(|i| i.damping_stiffness.as_ref());
         let beta = beta.map_or(Ok(0.0), |b| self.text.checked("inertia", "damping_stiffness", b))?;
         let mut density = vec![0.0; mesh.region_names.len()];
+        let names = self.text.names("tissue", file.tissue.iter().filter_map(|t| t.tunable.as_ref()))?;
+        if names.len() > MOST_TUNABLE {
+            let at =
+                file.tissue.iter().filter_map(|t| t.tunable.as_ref()).nth(MOST_TUNABLE).map_or(0, |t| t.span().start);
+            let message = format!("{} tissues are tunable; there are value references for {MOST_TUNABLE}", names.len());
+            return Err(self.text.at(at, message));
+        }
+        let mut tunable = Vec::new();
         for (k, spec) in file.tissue.iter().enumerate() {
             let spec = &self.with_preset(spec)?;
             let mine = |r: u32| material[r as usize] == k;
             if let Some(E) = self.springs(spec, midsides.is_empty())? {
+                if let Some(tunable) = &spec.tunable {
+                    let message =
+                        "`tunable` is for laws of a continuum; `mass-spring` is a fixed comparison".to_owned();
+                    return Err(self.text.at(tunable.span().start, message));
+                }
                 let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(WATER);
                 density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
                 let elements = (0..mesh.tets.len()).filter(|&e| mine(mesh.region[e])).map(|e| mesh.tets[e]);
@@ -123,6 +139,11 @@ impl Builder<'_> {
             let (law, constants) = self.law(spec)?;
             let Lame { mu, lambda } = (law.moduli)(&constants);
             let nu = lambda / (2.0 * (lambda + mu));
+            let tuning = spec.tunable.as_ref().map(|name| {
+                let tuning = Tuning { input: tunable.len(), E0: law.young(&constants) };
+                tunable.push((name.get_ref().clone(), tuning.E0));
+                tuning
+            });
             let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(WATER);
             let nodal = spec.pressure.as_ref().is_some_and(|p| p.get_ref() == "nodal");
             if nu > LOCKING_NU && midsides.is_empty() && !nodal {
@@ -138,10 +159,10 @@ impl Builder<'_> {
                 let tets: Vec<[u32; 4]> = elements.iter().map(|&e| mesh.tets[e]).collect();
                 let midsides: Vec<[u32; 6]> = elements.iter().filter_map(|&e| midsides.get(e).copied()).collect();
                 let elements = Elements { X: &mesh.nodes, tets: &tets, midsides: &midsides };
-                self.add_tissue(spec, law, &constants, beta, elements, &fields, &mut out)?;
+                self.add_tissue(spec, law, &constants, beta, elements, tuning, &fields, &mut out)?;
             }
         }
-        Ok(Tissue { terms: out.terms, density, n_history: out.n_history })
+        Ok(Tissue { terms: out.terms, density, n_history: out.n_history, tunable })
     }
 
     /// Pairs (g, tau) of a Prony series.

@@ -74,7 +74,7 @@ fn overlay(under: &mut TissueSpec, over: &TissueSpec) {
         };
     }
     take!(regions preset level energy E nu mu alpha b c1 c2 c10 c01 c20 c30 kappa density pressure viscous fibre damage
-          grade limit tension);
+          grade limit tension tunable);
 }
 
 /// The presets as a Markdown table.

@@ -82,19 +82,20 @@ impl Builder<'_> {
     pub(super) fn tracks(&self, file: &SceneFile, ports: &[Port]) -> Result<Vec<Track>, SceneError> {
         let mut tracks: Vec<Track> = Vec::new();
         for frame in &file.keyframe {
-            let inputs = || ports.iter().filter(|p| p.causality == Causality::Input);
+            let keyed = |p: &Port| matches!(p.causality, Causality::Input | Causality::TunableParameter);
+            let inputs = || ports.iter().filter(|p| keyed(p));
             let wanted = frame.port.get_ref();
             let (port, p) = ports
                 .iter()
                 .enumerate()
-                .find(|(_, p)| p.name == *wanted && p.causality == Causality::Input)
+                .find(|(_, p)| p.name == *wanted && keyed(p))
                 .ok_or_else(|| self.text.unknown("input", &frame.port, inputs().map(|p| p.name.as_str())))?;
             let (offset, len) = match &frame.row {
                 None => (0, p.len()),
                 Some(row) => {
-                    let width = p.len() / p.shape[0];
                     let k = p.rows.iter().position(|r| r == row.get_ref());
                     let k = k.ok_or_else(|| self.text.unknown("row", row, p.rows.iter().map(String::as_str)))?;
+                    let width = p.len() / p.shape[0];
                     (k * width, width)
                 }
             };

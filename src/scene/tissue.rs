@@ -11,7 +11,7 @@ use super::depth::Depth;
 use super::file::{DamageSpec, FibreSpec, GradeSpec, LimitSpec, TensionSpec, TissueSpec};
 use crate::effect::{
     Balance, Branches, Damaged, Elements, Fibre, Graded, Law, Limits, Measure, NodalPressure, Prestress, Softening,
-    damping_memory, nearest_on_path, stiffness_damping,
+    Tuned, Tuning, damping_memory, nearest_on_path, stiffness_damping,
 };
 use crate::energy::{Energy, Lame, Linear, StrainLimit};
 use crate::fem::{Material, Term};
@@ -47,6 +47,7 @@ impl Builder<'_> {
         constants: &[Vec<f64>],
         beta: f64,
         elements: Elements,
+        tuning: Option<Tuning>,
         fields: &Fields,
         out: &mut Terms,
     ) -> Result<(), SceneError> {
@@ -54,6 +55,12 @@ impl Builder<'_> {
         let graded = |material: Box<dyn Material>| -> Box<dyn Material> {
             match &factor {
                 Some(factor) => Box::new(Graded { material, factor: factor.clone() }),
+                None => material,
+            }
+        };
+        let tuned = |material: Box<dyn Material>| -> Box<dyn Material> {
+            match tuning {
+                Some(tuning) => Box::new(Tuned { material, tuning }),
                 None => material,
             }
         };
@@ -68,17 +75,23 @@ impl Builder<'_> {
         let mut own = constants;
         if nodal && lambda > left {
             let k = |e: usize| (lambda - left) * factor.as_ref().map_or(1.0, |f| f[e]);
-            out.terms.push(Box::new(NodalPressure::new(law.volume, elements, k)));
+            let pressure = NodalPressure::new(law.volume, elements, k);
+            out.terms.push(Box::new(match tuning {
+                Some(tuning) => pressure.tuned(tuning),
+                None => pressure,
+            }));
             softer = law.with_lambda(constants, left);
             own = &softer;
         }
         if let Some(damage) = &spec.damage {
             let softening = self.softening("tissue.damage", damage)?;
-            let damaged = Damaged { intact: (law.material)(own), softening, first: out.n_history };
+            let damaged = Damaged { intact: tuned((law.material)(own)), softening, first: out.n_history };
             out.n_history += elements.n_points();
             out.terms.push(elements.of(graded(Box::new(damaged))));
         } else if factor.is_some() {
-            out.terms.push(elements.of(graded((law.material)(own))));
+            out.terms.push(elements.of(graded(tuned((law.material)(own)))));
+        } else if let Some(tuning) = tuning {
+            out.terms.push((law.tuned)(own, elements, tuning));
         } else {
             out.terms.push((law.term)(own, elements));
         }
@@ -86,13 +99,13 @@ impl Builder<'_> {
             let measure = if law.name == Linear::NAME { Measure::Small } else { Measure::Finite };
             let Lame { mu, lambda } = (law.moduli)(own);
             let damping = Lame { mu: beta * mu, lambda: beta * lambda };
-            out.terms.push(elements.of(graded(stiffness_damping(damping, measure, out.n_history))));
+            out.terms.push(elements.of(graded(tuned(stiffness_damping(damping, measure, out.n_history)))));
             out.n_history += damping_memory(&elements);
         }
         if let Some(spec) = &spec.viscous {
             let branches = Branches { series: self.series(spec)?, first: out.n_history };
             out.n_history += branches.memory(&elements);
-            out.terms.push(elements.of(graded((law.viscous)(constants, branches))));
+            out.terms.push(elements.of(graded(tuned((law.viscous)(constants, branches)))));
         }
         if let Some(spec) = &spec.fibre {
             let fibre = self.fibre(spec, elements, fields)?;
@@ -109,7 +122,11 @@ impl Builder<'_> {
         }
         if let Some(spec) = &spec.limit {
             let E = mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu);
-            out.terms.push(elements.of(self.limits(spec, E, elements, fields)?));
+            let limits = self.limits(spec, E, elements, fields)?;
+            out.terms.push(match tuning.filter(|_| spec.stiffness.is_none()) {
+                Some(tuning) => elements.of(Tuned { material: limits, tuning }),
+                None => elements.of(limits),
+            });
         }
         if let Some(spec) = &spec.tension {
             let tension = elements.of(self.prestress(spec, elements, fields)?);

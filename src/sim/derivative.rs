@@ -19,16 +19,16 @@ use crate::port::{Slot, Type};
 use crate::solve::{Minimiser, Problem, Strategy};
 
 /// Largest motion in a difference, in sizes of the model: far above round-off, far below what curves the answer.
-const CHANGE: f64 = 1e-5;
+const CHANGE: f64 = 1e-6;
 /// Largest change of an input (SI units) by which the motion is first estimated.
 const FIRST_CHANGE: f64 = 1e-4;
 /// Passes that follower forces get, and the relative correction at which they end.
-const MOST_PASSES: usize = 30;
-const SETTLED: f64 = 1e-8;
+pub(super) const MOST_PASSES: usize = 30;
+pub(super) const SETTLED: f64 = 1e-8;
 
 /// The factored stiffness of one accepted state.
 pub(super) struct Sensitivity {
-    minimiser: Minimiser,
+    pub(super) minimiser: Minimiser,
     config: Configuration,
     inputs: Vec<f64>,
 }
@@ -125,7 +125,7 @@ impl Sim {
     /// forces change.
     fn sides(&mut self, model: &Model, direction: &[f64], h: f64, passes: usize) -> Result<Sides, SimError> {
         let parts = model.parts();
-        let here = &self.state.config;
+        let here = self.state.config.clone();
         let moved = [1.0, -1.0].map(|sign| {
             let inputs: Vec<f64> =
                 self.state.applied.iter().zip(direction).map(|(value, d)| value + sign * h * d).collect();
@@ -142,17 +142,13 @@ impl Sim {
             }
             Moved { inputs, pivots, wrenches, config }
         });
-        let known = self.sensitivity.as_ref().is_some_and(|s| s.config == *here && s.inputs == self.state.applied);
-        if !known {
-            self.sensitivity = None;
-            self.sensitivity = Some(Box::new(Sensitivity::new(model, &self.state)?));
-        }
-        let minimiser = &mut self.sensitivity.as_mut().expect("made above").minimiser;
         let n = model.dofs().n_blocks();
         let mut d = vec![Vec3::zeros(); n];
-        let follows = parts.terms.iter().any(|t| t.is_lagged()) || !model.dofs().bodies.is_empty();
+        let t = self.state.t;
+        let minimiser = &mut self.sensitivity(model)?.minimiser;
+        let follows = is_approximate(model, minimiser);
         for _ in 0..passes {
-            let sides = [0, 1].map(|k| moved[k].held(model, self.state.t, &d, if k == 0 { h } else { -h }));
+            let sides = [0, 1].map(|k| moved[k].held(model, t, &d, if k == 0 { h } else { -h }));
             let mut change: Vec<Vec3> = sides[0].g.iter().zip(&sides[1].g).map(|(p, m)| (p - m) / (2.0 * h)).collect();
             minimiser.apply_inverse(&mut change);
             let (mut size, mut correction) = (0.0_f64, 0.0_f64);
@@ -162,12 +158,34 @@ impl Sim {
                 correction = correction.max(c.norm());
             }
             if !follows || passes == 1 || correction <= SETTLED * size {
-                let held = |k: usize| moved[k].held(model, self.state.t, &d, if k == 0 { h } else { -h });
+                let held = |k: usize| moved[k].held(model, t, &d, if k == 0 { h } else { -h });
                 return Ok(Sides([held(0), held(1)]));
             }
         }
-        Err(SimError::NoDerivative("the forces that follow the surface are too strong for the stiffness".into()))
+        Err(too_strong())
     }
+
+    /// The factor at the accepted state; made where the last one was another's.
+    pub(super) fn sensitivity(&mut self, model: &Model) -> Result<&mut Sensitivity, SimError> {
+        let here = &self.state;
+        let kept = self.sensitivity.take().filter(|s| s.config == here.config && s.inputs == here.applied);
+        let made = match kept {
+            Some(kept) => kept,
+            None => Box::new(Sensitivity::new(model, here)?),
+        };
+        Ok(self.sensitivity.insert(made))
+    }
+}
+
+/// Whether the factor leaves something of the true stiffness out, so that solves must be repeated.
+pub(super) fn is_approximate(model: &Model, minimiser: &Minimiser) -> bool {
+    let follows = model.parts().terms.iter().any(|t| t.is_lagged()) || !model.dofs().bodies.is_empty();
+    follows || !minimiser.is_exact()
+}
+
+pub(super) fn too_strong() -> SimError {
+    let why = "forces that follow the surface, or elements on the verge of buckling, are too strong for the stiffness";
+    SimError::NoDerivative(why.into())
 }
 
 impl Sensitivity {
@@ -212,7 +230,7 @@ impl Moved {
     }
 }
 
-fn check(model: &Model, state: &State) -> Result<(), SimError> {
+pub(super) fn check(model: &Model, state: &State) -> Result<(), SimError> {
     let why = if !model.has_derivatives() {
         "the scene has inertia or tissue with a memory, so its state depends on the way it came"
     } else if !state.outputs.converged {
@@ -223,11 +241,11 @@ fn check(model: &Model, state: &State) -> Result<(), SimError> {
     Err(SimError::NoDerivative(why.into()))
 }
 
-fn mismatch(name: &str, wanted: usize, found: &[f64]) -> SimError {
+pub(super) fn mismatch(name: &str, wanted: usize, found: &[f64]) -> SimError {
     SimError::Range { name: name.into(), len: found.len(), offset: 0, end: wanted }
 }
 
-fn has_derivative(port: &crate::port::Port) -> bool {
+pub(super) fn has_derivative(port: &crate::port::Port) -> bool {
     use Slot::{BoneReactionForce, BoneReactionTorque, MarkerPosition, SkinPosition};
     port.is_settable() || matches!(port.slot, SkinPosition | MarkerPosition | BoneReactionForce | BoneReactionTorque)
 }

@@ -3,6 +3,7 @@
 #![allow(non_snake_case)]
 
 mod access;
+mod adjoint;
 mod derivative;
 mod linear_map;
 mod model;
@@ -16,8 +17,10 @@ mod start;
 mod state;
 mod step;
 
+pub use access::View;
 pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
 pub use ports::Layout;
+pub(crate) use ports::MOST_TUNABLE;
 pub use scheme::Scheme;
 pub use skin::Skin;
 pub use state::{State, StateError};
@@ -63,6 +66,14 @@ pub enum SimError {
         /// Port and element, 1-based: `bone.translation[2,1]`.
         name: String,
         /// What was found.
+        value: f64,
+    },
+    /// A modulus is not positive.
+    #[error("`{name}` is {value:?} Pa; a modulus must be positive")]
+    NotPositive {
+        /// Port.
+        name: String,
+        /// What was found, Pa.
         value: f64,
     },
     /// An input moves or pushes a bone that is not driven that way.
@@ -217,8 +228,27 @@ impl Sim {
         if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
             return Err(SimError::StepLength(dt));
         }
-        let report = step::advance(&self.model, &mut self.state, &mut self.work, dt)?;
+        let report = step::advance(&self.model, &mut self.state, &mut self.work, dt, None)?;
         self.forget();
+        Ok(report)
+    }
+
+    /// The same; `watch` sees every piece of the step as soon as it is accepted. Pieces before one that fails are taken back.
+    ///
+    /// # Errors
+    /// As for [`Sim::step`].
+    pub fn step_watched(&mut self, dt: f64, watch: &mut dyn FnMut(&View)) -> Result<StepReport, SimError> {
+        if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
+            return Err(SimError::StepLength(dt));
+        }
+        let model = self.model.clone();
+        let mut piece = |state: &State| {
+            let strain = || step::strain(&model, state, &state.config.x);
+            watch(&View { model: &model, state, strain: &strain });
+        };
+        let report = step::advance(&model, &mut self.state, &mut self.work, dt, Some(&mut piece))?;
+        self.forget();
+        watch(&self.view(&|| self.strain()));
         Ok(report)
     }
 

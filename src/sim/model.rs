@@ -87,6 +87,8 @@ pub struct ModelParts {
     pub embedding: Option<Embedding>,
     /// Bones, in the order of the ports' rows; no node belongs to two.
     pub bones: Vec<Bone>,
+    /// Names of the tissues whose stiffness can be set, in order.
+    pub tunable: Vec<String>,
     /// Names of the muscles, in order.
     pub muscles: Vec<String>,
     /// Names of the force loads, in order.
@@ -328,6 +330,11 @@ fn token(parts: &ModelParts, ports: &[Port]) -> String {
     let mesh = &parts.mesh;
     mesh.nodes.iter().flat_map(|x| x.iter()).for_each(|c| hash.update(c.to_le_bytes()));
     mesh.tets.as_flattened().iter().chain(&mesh.region).for_each(|i| hash.update(i.to_le_bytes()));
+    parts.midsides.as_flattened().iter().for_each(|i| hash.update(i.to_le_bytes()));
+    for set in &mesh.face_sets {
+        hash.update(&set.name);
+        set.triangles.as_flattened().iter().for_each(|i| hash.update(i.to_le_bytes()));
+    }
     for bone in &parts.bones {
         bone.nodes.iter().for_each(|a| hash.update(a.to_le_bytes()));
     }

@@ -11,8 +11,10 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Lays out the inputs of a scene with these bones `(drive, nodes)`, muscles, forces and pressures.
+    /// Lays out the inputs of a scene with these tunable tissues, bones `(drive, nodes)`, muscles, forces and pressures.
+    /// Tunable tissues come first, in their order.
     pub fn new(
+        n_tunable: usize,
         bones: &[(Drive, usize)],
         n_muscles: usize,
         n_loads: usize,
@@ -28,6 +30,9 @@ impl Layout {
                 layout.len += len;
             }
         };
+        for k in 0..n_tunable {
+            add(Slot::MaterialE(k as u32), 1, true);
+        }
         add(Slot::BoneTranslation, n, any(Drive::Pose));
         add(Slot::BoneRotation, n, any(Drive::Pose));
         add(Slot::BoneForce, n, any(Drive::Force));
@@ -67,6 +72,12 @@ impl Layout {
     }
 }
 
+/// Value reference of the first tunable tissue, and how many there may be.
+const FIRST_MATERIAL: u32 = 21;
+pub(crate) const MOST_TUNABLE: usize = 19;
+/// A modulus may fall to this part of the scene's; softer than that nothing is left of the tissue.
+const SOFTEST: f64 = 1e-3;
+
 /// Value references; blocks are part of the ABI and never renumbered.
 fn reference(slot: Slot) -> u32 {
     match slot {
@@ -78,6 +89,7 @@ fn reference(slot: Slot) -> u32 {
         Slot::MuscleActivation => 14,
         Slot::LoadForce => 15,
         Slot::LoadPressure => 16,
+        Slot::MaterialE(k) => FIRST_MATERIAL + k,
         Slot::Gravity => 50,
         Slot::BonePivot => 51,
         Slot::SkinPosition => 100,
@@ -113,11 +125,16 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
             return;
         }
         let start = match (layout.first(slot), causality) {
-            (Some(first), Causality::Input | Causality::Parameter) => {
+            (Some(first), Causality::Input | Causality::Parameter | Causality::TunableParameter) => {
                 parts.start[first..first + shape.iter().product::<usize>()].to_vec()
             }
-            (None, Causality::Input | Causality::Parameter) => return,
+            (None, Causality::Input | Causality::Parameter | Causality::TunableParameter) => return,
             _ => Vec::new(),
+        };
+        let min = match slot {
+            Slot::MuscleActivation => Some(0.0),
+            Slot::MaterialE(_) => Some(SOFTEST * start[0]),
+            _ => None,
         };
         ports.push(Port {
             name: name.into(),
@@ -129,13 +146,13 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
             causality,
             start,
             single: slot == Slot::MuscleActivation,
-            min: (slot == Slot::MuscleActivation).then_some(0.0),
+            min,
             max: (slot == Slot::MuscleActivation).then_some(1.0),
             rows: rows.to_vec(),
             description: description.into(),
         });
     };
-    use Causality::{CalculatedParameter, Independent, Input, Output, Parameter};
+    use Causality::{CalculatedParameter, Independent, Input, Output, Parameter, TunableParameter};
     use Type::{Boolean, Float64, Int32};
     let no = &[][..];
     add(Slot::Time, "time", Float64, no, "s", Independent, no_rows(), "Simulation time");
@@ -209,6 +226,11 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
         &parts.pressures,
         "Pressure of each pressure load; positive pushes into the tissue and follows the surface",
     );
+    for (k, tissue) in parts.tunable.iter().enumerate() {
+        let name = format!("material.{tissue}.E");
+        let text = format!("Young's modulus of tissue {tissue} at small strain; all its moduli follow in proportion");
+        add(Slot::MaterialE(k as u32), &name, Float64, no, "Pa", TunableParameter, no_rows(), &text);
+    }
     add(Slot::Gravity, "gravity", Float64, &[3], "m/s2", Parameter, no_rows(), "Acceleration of gravity");
     add(Slot::BonePivot, "bone.pivot", Float64, &[n, 3], "m", Parameter, &bones, "Rest position of each bone's pivot");
     add(
@@ -382,6 +404,7 @@ impl Model {
             return format!("input {k}");
         };
         match port.shape.as_slice() {
+            [] => port.name.clone(),
             [_, columns] => format!("{}[{},{}]", port.name, within / columns + 1, within % columns + 1),
             _ => format!("{}[{}]", port.name, within + 1),
         }

@@ -54,6 +54,14 @@ impl Skin {
         }
     }
 
+    /// Adds the transpose of [`Skin::of`]: what `w` at vertex `k` is at the nodes.
+    pub(super) fn add_transposed(&self, k: usize, w: &Vec3, field: &mut [Vec3]) {
+        match &self.embedding {
+            Some(embedding) => embedding.add_transposed(k, w, field),
+            None => field[self.nodes[k] as usize] += w,
+        }
+    }
+
     /// All vertices of a nodal field.
     pub fn all(&self, field: &[Vec3]) -> Vec<Vec3> {
         (0..self.len()).map(|k| self.of(k, field)).collect()
@@ -71,6 +79,16 @@ impl Skin {
         corners.iter().zip(weights).map(|(&a, w)| w * corner(a)).sum()
     }
 
+    /// Adds the transpose of [`Skin::within`].
+    pub(super) fn add_within_transposed(&self, corners: [u32; 3], weights: [f64; 3], w: &Vec3, field: &mut [Vec3]) {
+        for (&a, weight) in corners.iter().zip(weights) {
+            match &self.embedding {
+                Some(embedding) => embedding.add_transposed(a as usize, &(weight * w), field),
+                None => field[a as usize] += weight * w,
+            }
+        }
+    }
+
     /// Rows of three from element `offset` of the flattened field on; a whole row at a time where `out` is aligned.
     pub(super) fn gather(&self, field: &[Vec3], offset: usize, out: &mut [f64]) {
         if !(offset.is_multiple_of(3) && out.len().is_multiple_of(3)) {
@@ -79,8 +97,13 @@ impl Skin {
             }
             return;
         }
-        for (k, row) in (offset / 3..).zip(out.chunks_exact_mut(3)) {
-            row.copy_from_slice(self.of(k, field).as_slice());
+        match &self.embedding {
+            Some(embedding) => embedding.rows_into(offset / 3, field, out),
+            None => {
+                for (&a, row) in self.nodes[offset / 3..].iter().zip(out.as_chunks_mut::<3>().0) {
+                    *row = field[a as usize].into();
+                }
+            }
         }
     }
 }

@@ -231,6 +231,8 @@ impl State {
 pub(super) fn rest_inputs(model: &Model) -> Vec<f64> {
     let parts = model.parts();
     let mut rest = vec![0.0; parts.layout.len()];
+    let tunable = 0..parts.tunable.len();
+    rest[tunable.clone()].copy_from_slice(&parts.start[tunable]);
     if let Some(first) = parts.layout.first(crate::port::Slot::BonePivot) {
         let end = first + 3 * parts.bones.len();
         rest[first..end].copy_from_slice(&parts.start[first..end]);

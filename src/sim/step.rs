@@ -31,6 +31,8 @@ const BUDGET: u32 = 4;
 const GROWTH: f64 = 2.0;
 /// Change of ln dt beyond which the stiffness with inertia is factored anew.
 const DT_DRIFT: f64 = 0.1;
+/// Change of ln E beyond which the stiffness is factored anew.
+const MODULUS_DRIFT: f64 = 0.1;
 /// A jump across a bone-to-bone edge larger than this part of its length is reported.
 const LARGEST_JUMP: f64 = 0.3;
 /// The bones' common rigid motion is taken out first where it explains all but this part of their motion.
@@ -143,7 +145,7 @@ pub(super) fn initialise(model: &Model, state: &mut State, work: &mut Workspace)
         set_off(model, state, work);
         return Ok(StepReport::new(0));
     }
-    let report = advance(model, state, work, 0.0)?;
+    let report = advance(model, state, work, 0.0, None)?;
     // Nothing has moved yet: the way to the start equilibrium is no velocity.
     state.motion.halt();
     Ok(report)
@@ -164,9 +166,18 @@ fn set_off(model: &Model, state: &mut State, work: &mut Workspace) {
     state.motion.memory.iter_mut().zip(a).for_each(|(memory, a)| memory[0] = a);
 }
 
-/// Moves `state` on by `dt` seconds, or leaves it as it is.
-pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> Result<StepReport, SimError> {
+/// Moves `state` on by `dt` seconds, or leaves it as it is; `watch` sees the state after each accepted piece but the last.
+pub(super) fn advance(
+    model: &Model,
+    state: &mut State,
+    work: &mut Workspace,
+    dt: f64,
+    mut watch: Option<&mut dyn FnMut(&State)>,
+) -> Result<StepReport, SimError> {
     check_inputs(model, &state.inputs)?;
+    if let Some(report) = hold(model, state, dt) {
+        return Ok(report);
+    }
     if let Some(report) = look_up(model, state, work, dt)? {
         return Ok(report);
     }
@@ -206,6 +217,9 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
                     piece = even_part(1.0 - to, piece);
                     spent_before = report.iterations;
                 }
+                if let Some(watch) = watch.as_mut().filter(|_| to < 1.0) {
+                    watch(&halfway(model, state, work, &report, t, dt * (to - done)));
+                }
                 done = to;
             }
             Err(Setback::Coarse(factor)) => {
@@ -238,14 +252,39 @@ pub(super) fn advance(model: &Model, state: &mut State, work: &mut Workspace, dt
     }
     warn_of_jumps(model, worst_jump(model, &state.config.x), worst_jump(model, &work.config.x), &mut report);
     state.t += dt;
+    accept(model, state, work, &report, dt);
+    state.linearisation = linearisation;
+    Ok(report)
+}
+
+/// Takes over where `work` has come to.
+fn accept(model: &Model, state: &mut State, work: &Workspace, report: &StepReport, dt: f64) {
     state.config.copy_from(&work.config);
     state.motion.copy_from(&work.motion);
     state.history.copy_from_slice(&work.history);
     state.applied.copy_from_slice(&work.inputs);
-    state.linearisation = linearisation;
-    report.converged = true;
-    read_outputs(model, state, work, &report, dt);
-    Ok(report)
+    read_outputs(model, state, work, report, dt);
+}
+
+/// The state in the middle of a step, after a piece of `dt` seconds that ended at `t`.
+fn halfway(model: &Model, state: &State, work: &Workspace, report: &StepReport, t: f64, dt: f64) -> State {
+    let mut there = state.clone();
+    there.t = t;
+    accept(model, &mut there, work, report, dt);
+    there
+}
+
+/// A step on which nothing acts: an equilibrium stays where it is while its inputs do.
+fn hold(model: &Model, state: &mut State, dt: f64) -> Option<StepReport> {
+    let settled = state.outputs.converged && (state.linearisation.is_some() || state.partial);
+    if !(dt > 0.0 && settled && model.has_derivatives() && state.inputs == state.applied) {
+        return None;
+    }
+    let mut report = StepReport::new(1);
+    report.residual = state.outputs.residual;
+    state.t += dt;
+    (state.outputs.iterations, state.outputs.dt) = (0, dt);
+    Some(report)
 }
 
 /// A step of a scene that is linear in its inputs: read off its table; `None` where that cannot be done.
@@ -487,9 +526,16 @@ fn restore_factor(
     let dt = problem.at.dt;
     let as_made = |l: &Linearisation| in_time(model, At { dt: l.dt, ..At::NOWHERE }, l.dt_before);
     let near = |a: f64, b: f64| a == b || a != 0.0 && b != 0.0 && (a / b).ln().abs() <= DT_DRIFT;
+    // Tunable moduli come first among the inputs; a stiffness that is never made anew must be of these very ones.
+    let tunable = 0..model.parts().tunable.len();
+    let as_stiff = |l: &Linearisation| {
+        let mut moduli = l.inputs[tunable.clone()].iter().zip(&problem.at.inputs[tunable.clone()]);
+        moduli.all(|(made, now)| made == now || !problem.is_quadratic() && (made / now).ln().abs() <= MODULUS_DRIFT)
+    };
     let serves = |l: &Linearisation| {
-        model.parts().inertia.is_none() && model.parts().n_history == 0
-            || near(l.dt, dt) && near(as_made(l).inertia.sqrt(), problem.at.inertia.sqrt())
+        as_stiff(l)
+            && (model.parts().inertia.is_none() && model.parts().n_history == 0
+                || near(l.dt, dt) && near(as_made(l).inertia.sqrt(), problem.at.inertia.sqrt()))
     };
     if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
         let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
@@ -629,6 +675,9 @@ fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
         return Err(SimError::NotFinite { name: model.input_name(k), value: *value });
     }
     let parts = model.parts();
+    if let Some(k) = (0..parts.tunable.len()).find(|&k| inputs[k] <= 0.0) {
+        return Err(SimError::NotPositive { name: model.input_name(k), value: inputs[k] });
+    }
     for (slots, drive) in [
         ([Slot::BoneTranslation, Slot::BoneRotation], Drive::Pose),
         ([Slot::BoneForce, Slot::BoneTorque], Drive::Force),

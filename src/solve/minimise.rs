@@ -70,6 +70,8 @@ pub struct Minimiser {
     /// Rotation from the configuration that was factored to the one at hand.
     frame: Mat3,
     factored: bool,
+    /// Whether that was the true stiffness.
+    exact: bool,
     /// Where the factor was made.
     factored_at: Configuration,
     trial: Configuration,
@@ -103,6 +105,7 @@ impl Minimiser {
             strategy,
             frame: Mat3::identity(),
             factored: false,
+            exact: false,
             factored_at: config.clone(),
             trial: config.clone(),
             lag: config,
@@ -132,6 +135,11 @@ impl Minimiser {
     /// Whether a factor is at hand.
     pub fn is_factored(&self) -> bool {
         self.factored
+    }
+
+    /// Whether the factor at hand is that of the true stiffness, not of the projected one.
+    pub fn is_exact(&self) -> bool {
+        self.exact
     }
 
     /// Where the factor at hand was made.
@@ -164,6 +172,7 @@ impl Minimiser {
             match self.solver.factor(&self.assembly.K) {
                 Ok(()) => {
                     self.factored = true;
+                    self.exact = curvature == Curvature::Exact;
                     return Ok(());
                 }
                 Err(block) if !self.strategy.has(Rung::Projection) => {

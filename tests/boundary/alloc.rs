@@ -117,7 +117,7 @@ fn the_c_library_and_fmi_copy_without_allocation() {
         use std::ptr::null;
         #[rustfmt::skip]
         let instance = fmi3::fmi3InstantiateCoSimulation(
-            c"a".as_ptr(), token.as_ptr(), null(), 0, 0, 0, 0, null(), 0, std::ptr::null_mut(), None, null(),
+            c"a".as_ptr(), token.as_ptr(), null(), 0, 0, 0, 0, null(), 0, std::ptr::null_mut(), None, None,
         );
         assert!(!instance.is_null());
         fmi3::fmi3EnterInitializationMode(instance, 0, 0.0, 0.0, 0, 0.0);

@@ -27,7 +27,8 @@ typedef int (*AnyCall)(void *, uintptr_t, uintptr_t, uintptr_t, uintptr_t, uintp
 
 extern void *fmi3InstantiateCoSimulation(const char *, const char *, const char *, uint8_t, uint8_t, uint8_t, uint8_t,
                                          const uint32_t *, size_t, void *,
-                                         void (*)(void *, int, const char *, const char *), void *);
+                                         void (*)(void *, int, const char *, const char *),
+                                         void (*)(void *, double, uint8_t, uint8_t, uint8_t, uint8_t, uint8_t *, double *));
 extern void *fmi3InstantiateModelExchange(const char *, const char *, const char *, uint8_t, uint8_t, void *,
                                           void (*)(void *, int, const char *, const char *));
 extern void fmi3FreeInstance(void *);
@@ -117,6 +118,49 @@ static void instantiation(const char *token) {
     CHECK(logged == 9);
     fmi3FreeInstance(NULL);
     fmi2FreeInstance(NULL);
+}
+
+/* What the intermediate update does, and what it saw. */
+static struct {
+    void *instance;
+    int calls;
+    double time;
+} inside;
+
+static void update(void *environment, double time, uint8_t set, uint8_t get, uint8_t finished, uint8_t early,
+                   uint8_t *requested, double *early_time) {
+    const uint32_t clock = 0, unknown = 999;
+    double t = -1.0, one = 0.0;
+    uint8_t e, s, r;
+    CHECK(environment == &logged && !set && get && finished && !early && requested != NULL && early_time != NULL);
+    CHECK(fmi3GetFloat64(inside.instance, &clock, 1, &t, 1) == OK && t == time);
+    CHECK(fmi3GetFloat64(inside.instance, &unknown, 1, &one, 1) == ERROR);
+    CHECK(fmi3GetFloat64(inside.instance, &clock, 1, &one, 2) == ERROR);
+    /* Nothing else may be done inside a step. */
+    CHECK(fmi3SetFloat64(inside.instance, &clock, 1, &one, 1) == ERROR);
+    CHECK(fmi3DoStep(inside.instance, time, 0.1, 0, &e, &s, &r, &one) == ERROR);
+    CHECK(fmi3Terminate(inside.instance) == ERROR);
+    *requested = 1; /* is not asked for, and must not matter */
+    *early_time = time;
+    inside.time = time;
+    ++inside.calls;
+}
+
+static void intermediate_update(const char *token) {
+    const uint32_t translation = 10, clock = 0;
+    double d[6] = {0, 0, 0, 0.001, 0, 0}, reached = 0, t = 0;
+    uint8_t e, s, r = 9;
+    void *a = fmi3InstantiateCoSimulation("three", token, folder, 0, 1, 0, 1, NULL, 0, &logged, tell3, update);
+    CHECK(a != NULL);
+    inside.instance = a;
+    CHECK(fmi3EnterInitializationMode(a, 0, 0.0, 0.0, 0, 0.0) == OK && fmi3ExitInitializationMode(a) == OK);
+    CHECK(inside.calls == 0);
+    CHECK(fmi3SetFloat64(a, &translation, 1, d, 6) == OK);
+    CHECK(fmi3DoStep(a, 0.0, 0.25, 0, &e, &s, &r, &reached) == OK && reached == 0.25 && r == 0);
+    CHECK(inside.calls >= 1 && inside.time == 0.25);
+    CHECK(fmi3GetFloat64(a, &clock, 1, &t, 1) == OK && t == 0.25);
+    CHECK(fmi3DoStep(a, 0.25, 0.25, 0, &e, &s, &r, &reached) == OK && inside.time == 0.5);
+    fmi3FreeInstance(a);
 }
 
 static void states(const char *token) {
@@ -220,6 +264,7 @@ int main(int argc, char **argv) {
     read_names(argv[2]);
     instantiation(token);
     states(token);
+    intermediate_update(token);
     anything(token);
     if (failures == 0) printf("misuse: all is well\n");
     return failures != 0;

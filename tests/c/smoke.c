@@ -67,6 +67,10 @@ static void misuse(CutisSim *sim, size_t bones, size_t skin) {
     CHECK(isnan(cutis_sim_time(NULL)));
     CHECK(cutis_sim_restore(sim, NULL) == CUTIS_NULL);
     CHECK(cutis_sim_save(NULL) == NULL);
+    CHECK(cutis_sim_directional_derivative(NULL, &skin, 1, &bones, 1, d, 0, d, 0) == CUTIS_NULL);
+    CHECK(cutis_sim_adjoint_derivative(sim, NULL, 1, &bones, 1, NULL, 0, NULL, 0) == CUTIS_NULL);
+    CHECK(cutis_sim_adjoint_derivative(sim, &skin, 1, &bones, 1, NULL, 0, d, cutis_port_len(sim, bones)) == CUTIS_STEP);
+    CHECK(cutis_sim_message(sim, message, sizeof message) > 1 && strstr(message, "equilibrium") != NULL);
     CHECK(cutis_sim_warning(sim, message, sizeof message) >= 1 && cutis_sim_warning(NULL, message, 9) == 0);
     CHECK(cutis_sim_message(NULL, message, sizeof message) == 0);
     cutis_sim_free(NULL);
@@ -78,7 +82,8 @@ int main(int argc, char **argv) {
     char why[512] = "";
     double *d, *x, *y;
     unsigned char *bytes;
-    size_t bones, skin, n, size;
+    size_t bones, skin, n, size, i;
+    double one = 0.0, other = 0.0;
     CutisState *state, *copy = NULL;
     CutisSim *sim;
 
@@ -136,6 +141,15 @@ int main(int argc, char **argv) {
     bytes[size / 2] ^= 1;
     CHECK(cutis_state_deserialize(sim, bytes, size, &copy) == CUTIS_STATE && copy == NULL);
     CHECK(cutis_state_deserialize(sim, bytes, 3, &copy) == CUTIS_STATE && copy == NULL);
+
+    /* <J v, J v> = <J^T J v, v>, with v in d and x, y for the products. */
+    CHECK(cutis_sim_directional_derivative(sim, &skin, 1, &bones, 1, d, cutis_port_len(sim, bones), x, n) == CUTIS_OK);
+    CHECK(cutis_sim_adjoint_derivative(sim, &skin, 1, &bones, 1, x, n, y, cutis_port_len(sim, bones)) == CUTIS_OK);
+    for (i = 0; i < n; ++i) one += x[i] * x[i];
+    for (i = 0; i < cutis_port_len(sim, bones); ++i) other += y[i] * d[i];
+    CHECK(one > 0.0 && fabs(one - other) < 1e-7 * one);
+    CHECK(cutis_sim_directional_derivative(sim, &skin, 1, &bones, 1, d, 1, x, n) == CUTIS_ARGUMENT);
+    CHECK(cutis_sim_directional_derivative(sim, &skin, 1, &n, 1, d, 1, x, n) == CUTIS_ARGUMENT);
 
     CHECK(cutis_sim_reset(sim) == CUTIS_OK && cutis_sim_time(sim) == 0.0);
     cutis_sim_free(sim);

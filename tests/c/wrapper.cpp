@@ -36,6 +36,14 @@ int main() {
     sim.restore(sim.deserialize(bytes));
     assert(sim.get("skin.position") == moved && std::fabs(sim.time() - 0.1) < 1e-15);
 
+    const std::vector<std::size_t> out{skin, sim.port("bone.reactionForce")}, in{sim.port("bone.translation")};
+    const std::vector<double> v{0, 0, 0, 1.0, -0.5, 0.25}, Jv = sim.directional_derivative(out, in, v);
+    const std::vector<double> JTJv = sim.adjoint_derivative(out, in, Jv);
+    double one = 0.0, other = 0.0;
+    for (double x : Jv) one += x * x;
+    for (std::size_t k = 0; k < v.size(); ++k) other += JTJv[k] * v[k];
+    assert(one > 0.0 && std::fabs(one - other) < 1e-7 * one);
+
     int thrown = 0;
     auto refused = [&](CutisStatus status, const char *part, auto call) {
         try {
@@ -50,7 +58,9 @@ int main() {
     refused(CUTIS_ARGUMENT, "", [&] { sim.step(-1.0); });
     refused(CUTIS_ARGUMENT, "line 1", [&] { cutis::Sim::from_text("nonsense"); });
     refused(CUTIS_STATE, "", [&] { sim.deserialize(std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + 40)); });
-    assert(thrown == 5);
+    refused(CUTIS_ARGUMENT, "seed", [&] { sim.directional_derivative(out, in, {1.0}); });
+    refused(CUTIS_ARGUMENT, "an input", [&] { sim.adjoint_derivative(out, out, Jv); });
+    assert(thrown == 7);
     assert(sim.get("skin.position") == moved);
     std::puts("wrapper: all is well");
     return 0;

@@ -11,12 +11,15 @@ import sys
 import textwrap
 import threading
 import time
+import zipfile
+from ctypes import POINTER, c_double, c_uint32
 
 import fmpy
 import numpy as np
 import pytest
 from conftest import ARCHIVES, RELEASE, ROOT, SCENE, Archive, Host2, Host3
 from fmpy.validation import validate_fmu
+from lxml import etree
 
 DT = 1 / 64
 STEPS = 6
@@ -97,6 +100,20 @@ def test_get_is_a_copy(archive3):
     assert seconds < 1e-3
 
 
+def test_terminals_and_icons_are_valid(archive3):
+    """Against the standard's schema; every member is a variable, and bones, skin and markers have a terminal each."""
+    with zipfile.ZipFile(archive3.path) as archive:
+        tree = etree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+        icon = archive.read("terminalsAndIcons/icon.png")
+    etree.XMLSchema(etree.parse(os.path.join(os.path.dirname(fmpy.__file__), "schema/fmi3/fmi3TerminalsAndIcons.xsd"))).assertValid(tree)
+    names = {v.name for v in archive3.description.modelVariables}
+    members = {t.get("name"): {m.get("memberName"): m.get("variableName") for m in t} for t in tree.iter("Terminal")}
+    assert all(variable in names for terminal in members.values() for variable in terminal.values())
+    assert members["bones"]["translation"] == "bone.translation" and "reactionForce" in members["bones"]
+    assert {"position", "restPosition", "triangles"} <= set(members["skin"]) and "position" in members["markers"]
+    assert icon[:4] == b"\x89PNG"
+
+
 # ------------------------------------------------------------------ one trajectory
 
 
@@ -138,6 +155,13 @@ def test_fmi2_high_level_has_the_bits_of_the_c_library(archive2, jaw, through_c)
     )
     values = np.stack([result[name] for name in names], axis=1)[1:]
     assert np.array_equal(values, through_c["marker.position"])
+
+
+def test_the_full_fmi2_archive_has_the_skin_of_the_c_library(archive2_full, jaw, through_c):
+    host = Host2(archive2_full)
+    (skin,) = drive(host, jaw, ["skin.position"])
+    host.close()
+    assert np.array_equal(skin, through_c["skin.position"])
 
 
 def test_command_line_has_the_bits_of_fmi3(archive3, tmp_path):
@@ -360,6 +384,33 @@ def test_directional_derivatives_meet_differences(host3, jaw):
     assert np.abs(difference - slope).max() < 2e-3 * np.abs(slope).max()
 
 
+def adjoint(host, unknowns, knowns, seed):
+    """`fmi3GetAdjointDerivative`; variables by name, values one after another."""
+    n = sum(int(np.prod(host.shape(name))) for name in knowns)
+    out, seed = np.zeros(n), np.ascontiguousarray(seed, dtype=np.float64)
+    references = [(c_uint32 * len(names))(*(host.variables[name].valueReference for name in names)) for names in (unknowns, knowns)]
+    pointer = lambda a: a.ctypes.data_as(POINTER(c_double))  # noqa: E731
+    host.fmu.fmi3GetAdjointDerivative(
+        host.fmu.component, references[0], len(unknowns), references[1], len(knowns), pointer(seed), seed.size, pointer(out), n
+    )
+    return out
+
+
+def test_adjoint_is_the_transpose_of_the_directional_derivative(host3, jaw):
+    drive(host3, jaw[:3], ["skin.position"])
+    unknowns = ["skin.position", "marker.position", "bone.reactionTorque"]
+    knowns = ["bone.translation", "bone.rotation", "load.force"]
+    rng = np.random.default_rng(3)
+    v = rng.standard_normal(sum(int(np.prod(host3.shape(name))) for name in knowns))
+    n = sum(int(np.prod(host3.shape(name))) for name in unknowns)
+    references = lambda names: [host3.variables[name].valueReference for name in names]  # noqa: E731
+    Jv = np.array(host3.fmu.getDirectionalDerivative(references(unknowns), references(knowns), list(v), n))
+    w = Jv + 0.3 * np.abs(Jv).max() * rng.standard_normal(n)
+    JTw = adjoint(host3, unknowns, knowns, w)
+    assert abs(w @ Jv - JTw @ v) < 1e-7 * (np.abs(w) @ np.abs(Jv))
+    assert not adjoint(host3, unknowns, knowns, np.zeros(n)).any()
+
+
 def test_directional_derivatives_are_those_of_fmi3(host3, host2, jaw):
     names = ["marker.position", "bone.reactionForce"]
     n = [int(np.prod(host3.shape(name))) for name in names]
@@ -373,6 +424,23 @@ def test_directional_derivatives_are_those_of_fmi3(host3, host2, jaw):
     unknowns = [r for name in names for r in host2._scalars(name)]
     found = host2.fmu.getDirectionalDerivative(unknowns[::-1], host2._scalars("bone.translation"), list(seed))
     assert np.array_equal(np.array(found)[::-1], np.array(wanted))
+
+
+@pytest.mark.parametrize("kind", ["fmi3", "fmi2"])
+def test_stiffness_can_be_set_between_steps(kind, host3, host2, library, jaw):
+    host = host3 if kind == "fmi3" else host2
+    variable = next(v for v in host.about.modelVariables if v.name == "material.fat.E")
+    assert (variable.causality, variable.variability) == ("parameter", "tunable")
+    drive(host, jaw, ["marker.position"])
+    before = np.asarray(host.get("bone.reactionForce")).copy()
+    host.set("material.fat.E", [2e4])
+    host.step(STEPS * DT, DT)
+    stiffer = np.asarray(host.get("bone.reactionForce"))
+    assert np.linalg.norm(stiffer) > 1.05 * np.linalg.norm(before)
+    sim = library.from_text(SCENE.read_text().replace("E = 5e3", "E = 2e4"), SCENE.parent)
+    drive(sim, jaw, ["marker.position"], c=True)
+    wanted = sim.get("bone.reactionForce").ravel()
+    assert np.abs(stiffer.ravel() - wanted).max() < 1e-3 * np.abs(wanted).max()
 
 
 def test_parallel_instances_do_not_meet(archive3, jaw, through_c):
@@ -392,6 +460,86 @@ def test_parallel_instances_do_not_meet(archive3, jaw, through_c):
         host.close()
 
 
+def test_reset_after_everything_was_disturbed(host3, jaw, through_c):
+    """Every settable variable elsewhere, a few steps, an error: reset gives start values and bits of a new instance."""
+    settable = [v for v in host3.about.modelVariables if v.causality in ("input", "parameter") and v.type == "Float64"]
+    start = {v.name: np.asarray(host3.get(v.name)).copy() for v in settable}
+    host3.fmu.enterInitializationMode(startTime=7.0)
+    for v in settable:
+        host3.set(v.name, start[v.name] * 1.25 + (0.0 if v.name.startswith("material") else 1e-4))
+    host3.fmu.exitInitializationMode()
+    host3.step(7.0, DT)
+    with pytest.raises(Exception, match="fmi3DoStep"):
+        host3.step(99.0, DT)
+    host3.fmu.reset()
+    for v in settable:
+        assert np.array_equal(host3.get(v.name), start[v.name]), v.name
+    (skin,) = drive(host3, jaw, ["skin.position"])
+    assert np.array_equal(skin, through_c["skin.position"])
+
+
+def test_between_steps_inputs_are_new_and_outputs_old(host3, jaw):
+    drive(host3, jaw[:2], ["skin.position"])
+    before = host3.get("skin.position")
+    host3.set("bone.translation", jaw[-1])
+    assert np.array_equal(host3.get("skin.position"), before)
+    assert np.array_equal(host3.get("bone.translation"), jaw[-1])
+
+
+def test_references_may_repeat(host3):
+    host3.initialise()
+    marker = host3.variables["marker.position"].valueReference
+    n = int(np.prod(host3.shape("marker.position")))
+    twice = host3.fmu.getFloat64([marker, 0, marker], nValues=2 * n + 1)
+    assert twice[:n] == twice[n + 1 :]
+
+
+def test_ten_tenths_reach_the_stop_time(archive3):
+    host = Host3(archive3)
+    host.fmu.enterInitializationMode(startTime=0.0, stopTime=1.0)
+    host.fmu.exitInitializationMode()
+    for k in range(10):
+        host.step(sum([0.1] * k), 0.1)
+    host.close()
+
+
+def test_categories_are_told_apart_and_silence_is_kept(archive3, jaw):
+    host = Host3(archive3, logging=True)
+    host.initialise()
+    told = {}
+    for names in (["logStatusError"], ["logNonlinearSystems"], []):
+        host.fmu.setDebugLogging(True, names)
+        host.log.clear()
+        host.set("bone.translation", jaw[len(told) + 1])
+        host.step(len(told) * DT, DT)
+        told[" ".join(names)] = list(host.log)
+    host.fmu.setDebugLogging(False, [])
+    host.log.clear()
+    with pytest.raises(Exception, match="fmi3DoStep"):
+        host.step(99.0, DT)
+    assert told["logStatusError"] == [] and len(told["logNonlinearSystems"]) == len(told[""]) == 1 and host.log == []
+    host.close()
+
+
+def test_instances_leave_nothing_behind(tmp_path):
+    """Memory, threads, working folder and open files of the host after hundreds of instances are those after the first."""
+    script = f"""
+        import os, sys; sys.path.insert(0, {str(ROOT / "tests" / "fmu")!r})
+        import bars
+        archive, _ = bars.packed("small", {str(tmp_path)!r})
+        seen = lambda: (os.getcwd(), len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd")), open("/proc/self/status").read().split("SigCgt")[1].split()[1])
+        for _ in range(50):
+            bars.cycle(archive)
+        before, memory = seen(), bars.resident()
+        for _ in range(250):
+            bars.cycle(archive)
+        assert seen() == before, (before, seen())
+        assert bars.resident() - memory < 2e6, bars.resident() - memory
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and done.stdout == done.stderr == "", done.stdout + done.stderr
+
+
 # ------------------------------------------------------------------ misuse, each in a process of its own
 
 MISUSE = {
@@ -401,6 +549,21 @@ MISUSE = {
     "one value of an array": "refused(lambda: host.fmu.getFloat64([100], nValues=1))",
     "set an output": "refused(lambda: host.set('marker.position', host.get('marker.position')))",
     "set NaN": "refused(lambda: host.set('bone.translation', np.full(host.shape('bone.translation'), np.nan)))",
+    "set a fixed parameter after the start": "host.initialise(); refused(lambda: host.set('bone.pivot', host.get('bone.pivot')))",
+    "a stiffness of nothing": "host.initialise(); refused(lambda: host.set('material.fat.E', [0.0]))",
+    "output derivatives without inertia": "host.initialise(); refused(lambda: host.fmu.fmi3GetOutputDerivatives(host.fmu.component, (c_uint32 * 1)(110), 1, (c_int32 * 1)(1), (c_double * 27)(), 27))",
+    "step after an error": "host.initialise(); refused(lambda: host.fmu.getFloat64([999])); refused(lambda: host.step(0.0, 0.125)); refused(lambda: host.set('bone.translation', 0 * host.get('bone.translation')))",
+    "terminate after an error": "host.initialise(); refused(lambda: host.fmu.getFloat64([999])); refused(host.fmu.terminate)",
+    "step past the stop time": "host.fmu.enterInitializationMode(startTime=0.0, stopTime=0.25); host.fmu.exitInitializationMode(); host.step(0.0, 0.25); refused(lambda: host.step(0.25, 0.01))",
+    "set after terminate": "host.initialise(); host.fmu.terminate(); refused(lambda: host.set('bone.translation', 0 * host.get('bone.translation')))",
+    "step after terminate": "host.initialise(); host.fmu.terminate(); refused(lambda: host.step(0.0, 0.1))",
+    "exit before enter": "refused(host.fmu.exitInitializationMode)",
+    "configuration mode": "refused(host.fmu.enterConfigurationMode)",
+    "the type of another": "refused(lambda: host.fmu.getInt32([100], nValues=3)); host.fmu.reset(); refused(lambda: host.fmu.getFloat64([200]))",
+    "set topology": "refused(lambda: host.fmu.setInt32([301], [0]))",
+    "undeclared category": "refused(lambda: host.fmu.setDebugLogging(True, ['logMagic']))",
+    "stop before start": "refused(lambda: host.fmu.enterInitializationMode(startTime=1.0, stopTime=0.5))",
+    "clock": "refused(lambda: host.fmu.fmi3GetClock(host.fmu.component, (c_uint32 * 1)(0), 1, (c_bool * 1)()))",
     "step too early": "refused(lambda: host.step(0.0, 0.1))",
     "step of NaN": "host.initialise(); refused(lambda: host.step(0.0, float('nan')))",
     "step of infinity": "host.initialise(); refused(lambda: host.step(0.0, float('inf')))",
@@ -412,6 +575,10 @@ MISUSE = {
     "start at NaN": "refused(lambda: host.initialise(float('nan')))",
     "event mode": "host.initialise(); refused(host.fmu.enterEventMode)",
     "derivatives": "host.initialise(); refused(lambda: host.fmu.getDirectionalDerivative([100], [10], [1.0], 1))",
+    "derivatives too early": "refused(lambda: host.fmu.getDirectionalDerivative([110], [10], [0.0] * host.variables['bone.translation'].shape[0] * 3, 27))",
+    "adjoint of short seeds": "host.initialise(); one = (c_uint32 * 1)(100); two = (c_uint32 * 1)(10); a = (c_double * 6)(); refused(lambda: host.fmu.fmi3GetAdjointDerivative(host.fmu.component, one, 1, two, 1, a, 1, a, 6))",
+    "adjoint by an output": "host.initialise(); one = (c_uint32 * 1)(110); a = (c_double * 27)(); refused(lambda: host.fmu.fmi3GetAdjointDerivative(host.fmu.component, one, 1, one, 1, a, 27, a, 27))",
+    "adjoint of nothing at all": "host.initialise(); refused(lambda: host.fmu.fmi3GetAdjointDerivative(host.fmu.component, None, 1, None, 1, None, 1, None, 1))",
     "garbage as state": "refused(lambda: host.fmu.deserializeFMUState(b'x' * 1000))",
     "state cut short": "s = host.fmu.serializeFMUState(host.fmu.getFMUState()); refused(lambda: host.fmu.deserializeFMUState(s[:-1]))",
     "state of a flipped bit": "s = bytearray(host.fmu.serializeFMUState(host.fmu.getFMUState())); s[99] ^= 4; refused(lambda: host.fmu.deserializeFMUState(bytes(s)))",

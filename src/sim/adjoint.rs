@@ -1,0 +1,368 @@
+//! The gradient of any weighting of outputs by all inputs at once: the transpose of [`super::derivative`].
+//!
+//! ```text
+//! L = w . y(x, s),  g(x, s) = 0:    A^T lambda = -(dy/dx)^T w,    dL/ds = (dy/ds)^T w + (dg/ds)^T lambda
+//! ```
+//!
+//! One solve with the stiffness that directional derivatives use, whatever the number of inputs. Reactions are forces at
+//! nodes, so their weights enter as a nodal field `eta` beside `lambda`: both are contracted with the change of the
+//! gradient in one go. By poses that contraction is a force and a torque on the bone; by inputs that terms read it is a
+//! difference of those terms alone, exact since they are linear in them. Where forces follow the surface, or a bone is free
+//! to turn under a torque, `A` is not symmetric: its transpose is solved with `K` by iteration.
+//!
+//! Source: Griewank & Walther, "Evaluating Derivatives", 2nd ed., 2008, section 15.3, for the implicit function's adjoint.
+
+use super::derivative::{MOST_PASSES, SETTLED, check, has_derivative, is_approximate, mismatch, too_strong};
+use super::model::{Drive, Model};
+use super::step::{complete, read_pivots};
+use super::{Sim, SimError};
+use crate::fem::{At, Configuration};
+use crate::math::{Mat3, Pose, Vec3, skew};
+use crate::port::{Slot, Type};
+
+/// Largest motion in a difference of gradients, in sizes of the model.
+const CHANGE: f64 = 1e-6;
+
+/// Coefficients of what moves: `dL = sum_a x_a . dx_a + sum_b pivot_b . dp_b + sum_a eta_a . dg_a`.
+struct Weights {
+    /// Of node positions.
+    x: Vec<Vec3>,
+    /// Of the current pivots of the bones.
+    pivot: Vec<Vec3>,
+    /// Of the nodal gradient.
+    eta: Vec<Vec3>,
+}
+
+/// The accepted state with what its transposed stiffness needs.
+struct Place<'a> {
+    model: &'a Model,
+    at: At<'a>,
+    config: &'a Configuration,
+    /// Pivots at rest, m.
+    pivots: &'a [Vec3],
+    /// Gradient at the nodes, N.
+    g: &'a [Vec3],
+    /// Size of the model, m.
+    size: f64,
+}
+
+impl Sim {
+    /// Gradient of `seed . unknowns` by the ports `knowns`, at the last accepted state: `sensitivity` is overwritten with the
+    /// derivative by each element of the knowns, one after another.
+    ///
+    /// Ports as for [`Sim::directional_derivative`], whose transpose it is. The cost is that of one direction, plus two
+    /// gradients of the terms that read them for each known load, pressure, activation or parameter.
+    ///
+    /// # Errors
+    /// As for [`Sim::directional_derivative`]. The state does not change.
+    pub fn adjoint_derivative(
+        &mut self,
+        unknowns: &[usize],
+        seed: &[f64],
+        knowns: &[usize],
+        sensitivity: &mut [f64],
+    ) -> Result<(), SimError> {
+        let model = self.model.clone();
+        check(&model, &self.state)?;
+        complete(&model, &mut self.state, &self.work);
+        let mut wanted = Vec::new();
+        let mut n = 0;
+        for &known in knowns {
+            let port =
+                self.port(known, Type::Float64, "an input that derivatives can be taken by", |p| p.is_settable())?;
+            wanted.push((port.slot, port.len()));
+            n += port.len();
+        }
+        if n != sensitivity.len() {
+            return Err(mismatch("sensitivity", n, sensitivity));
+        }
+        if !seed.iter().all(|v| v.is_finite()) {
+            return Err(SimError::NoDerivative("the seed is not finite".into()));
+        }
+        let parts = model.parts();
+        let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
+        read_pivots(&model, &self.state.applied, &mut pivots);
+        let config = self.state.config.clone();
+        let inputs = self.state.applied.clone();
+        let at = At { t: self.state.t, inputs: &inputs, x_lag: &config.x, ..At::NOWHERE };
+        let mut g = vec![Vec3::zeros(); config.x.len()];
+        for term in &parts.terms {
+            term.add_gradient(&at, &config.x, &mut g);
+        }
+        let X = &model.mesh().nodes;
+        let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
+        let size = (high - low).norm();
+        let place = Place { model: &model, at, config: &config, pivots: &pivots, g: &g, size };
+
+        let mut weights = Weights::nothing(&place);
+        let mut of_inputs = vec![0.0; inputs.len()];
+        let mut left = seed;
+        for &unknown in unknowns {
+            let port = self.port(unknown, Type::Float64, "an output that has derivatives", has_derivative)?;
+            let (w, later) = left.split_at_checked(port.len()).ok_or_else(|| mismatch("seed", port.len(), left))?;
+            match parts.layout.first(port.slot) {
+                Some(first) => of_inputs[first..].iter_mut().zip(w).for_each(|(sum, w)| *sum += w),
+                None => weights.add(&place, port.slot, w),
+            }
+            left = later;
+        }
+        if !left.is_empty() {
+            return Err(mismatch("seed", 0, left));
+        }
+
+        let minimiser = &mut self.sensitivity(&model)?.minimiser;
+        let repeats = is_approximate(&model, minimiser);
+        let lambda = place.solve(&weights, repeats, |d| minimiser.apply_inverse(d))?;
+        let xi: Vec<Vec3> = place.spread(&lambda).iter().zip(&weights.eta).map(|(l, e)| l + e).collect();
+        let mut q = place.transposed(&xi);
+        q.iter_mut().zip(&weights.x).for_each(|(q, w)| *q += w);
+        let contraction = Contraction { place: &place, lambda: &lambda, xi: &xi, q: &q, pivot: &weights.pivot };
+        let mut left = sensitivity;
+        for (slot, n) in wanted {
+            let (now, later) = left.split_at_mut(n);
+            contraction.by(slot, now);
+            let first = parts.layout.first(slot).expect("every settable port lies in the layout");
+            now.iter_mut().zip(&of_inputs[first..]).for_each(|(sum, w)| *sum += w);
+            left = later;
+        }
+        Ok(())
+    }
+}
+
+impl Weights {
+    fn nothing(place: &Place) -> Weights {
+        let n = place.config.x.len();
+        Weights {
+            x: vec![Vec3::zeros(); n],
+            pivot: vec![Vec3::zeros(); place.pivots.len()],
+            eta: vec![Vec3::zeros(); n],
+        }
+    }
+
+    /// Weighs the rows of one output.
+    fn add(&mut self, place: &Place, slot: Slot, w: &[f64]) {
+        let parts = place.model.parts();
+        for (k, w) in w.chunks_exact(3).map(Vec3::from_column_slice).enumerate() {
+            match slot {
+                Slot::SkinPosition => place.model.skin().add_transposed(k, &w, &mut self.x),
+                Slot::MarkerPosition => {
+                    let marker = &parts.markers[k];
+                    place.model.skin().add_within_transposed(marker.nodes, marker.weights, &w, &mut self.x);
+                }
+                // f = -sum_a g_a
+                Slot::BoneReactionForce => parts.bones[k].nodes.iter().for_each(|&a| self.eta[a as usize] -= w),
+                // m = -sum_a r_a x g_a with r_a = x_a - p
+                _ => {
+                    for &a in &parts.bones[k].nodes {
+                        let (r, g) = (place.arm(k, a), place.g[a as usize]);
+                        self.eta[a as usize] -= w.cross(&r);
+                        self.x[a as usize] += w.cross(&g);
+                        self.pivot[k] -= w.cross(&g);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Place<'_> {
+    /// From the current pivot of a bone to a node.
+    fn arm(&self, bone: usize, a: u32) -> Vec3 {
+        self.config.x[a as usize] - self.pivots[bone] - self.config.poses[bone].t
+    }
+
+    /// A field of unknowns as one of nodes: nodes of force-driven bones turn with them, driven nodes stay.
+    fn spread(&self, lambda: &[Vec3]) -> Vec<Vec3> {
+        let dofs = self.model.dofs();
+        let mut xi = vec![Vec3::zeros(); self.config.x.len()];
+        for (&a, l) in dofs.free.iter().zip(lambda) {
+            xi[a as usize] = *l;
+        }
+        for body in &dofs.bodies {
+            let (t, w) = (lambda[body.block as usize], lambda[body.block as usize + 1]);
+            for &a in &body.nodes {
+                xi[a as usize] = t + w.cross(&self.arm(body.bone, a));
+            }
+        }
+        xi
+    }
+
+    /// `(dg/dx)^T xi` over the nodes: the symmetric part by central differences, that of following forces in closed form.
+    fn transposed(&self, xi: &[Vec3]) -> Vec<Vec3> {
+        let terms = &self.model.parts().terms;
+        let largest = xi.iter().map(Vec3::norm).fold(0.0, f64::max);
+        let mut out = vec![Vec3::zeros(); xi.len()];
+        if largest == 0.0 {
+            return out;
+        }
+        let h = CHANGE * self.size / largest;
+        let mut sides = [h, -h].map(|h| {
+            let x: Vec<Vec3> = self.config.x.iter().zip(xi).map(|(x, xi)| x + h * xi).collect();
+            let mut g = vec![Vec3::zeros(); x.len()];
+            for term in terms {
+                term.add_gradient(&self.at, &x, &mut g);
+            }
+            g
+        });
+        let [plus, minus] = &mut sides;
+        for ((out, p), m) in out.iter_mut().zip(plus).zip(minus) {
+            *out = (*p - *m) / (2.0 * h);
+        }
+        terms.iter().for_each(|t| t.add_lag_transposed(&self.at, xi, &mut out));
+        out
+    }
+
+    /// A nodal field gathered into the unknowns: forces, and torques about the pivots.
+    fn gather(&self, q: &[Vec3]) -> Vec<Vec3> {
+        let mut out = vec![Vec3::zeros(); self.model.dofs().n_blocks()];
+        self.model.dofs().reduce(q, self.config, self.pivots, &mut out);
+        out
+    }
+
+    /// `A^T lambda`.
+    fn transposed_of_unknowns(&self, lambda: &[Vec3]) -> Vec<Vec3> {
+        let mut out = self.gather(&self.transposed(&self.spread(lambda)));
+        // The arms of the gradient turn with the bone.
+        for body in &self.model.dofs().bodies {
+            let turn = body.block as usize + 1;
+            for &a in &body.nodes {
+                out[turn] += self.arm(body.bone, a).cross(&self.g[a as usize].cross(&lambda[turn]));
+            }
+        }
+        out
+    }
+
+    /// lambda, by solves with `K` that are repeated where `K` is not `A^T`.
+    fn solve(
+        &self,
+        weights: &Weights,
+        repeats: bool,
+        mut apply_inverse: impl FnMut(&mut [Vec3]),
+    ) -> Result<Vec<Vec3>, SimError> {
+        let mut q = self.transposed(&weights.eta);
+        q.iter_mut().zip(&weights.x).for_each(|(q, w)| *q += w);
+        let mut c = self.gather(&q);
+        for body in &self.model.dofs().bodies {
+            c[body.block as usize] += weights.pivot[body.bone];
+        }
+        c.iter_mut().for_each(|c| *c = -*c);
+        let mut lambda = c.clone();
+        apply_inverse(&mut lambda);
+        if !repeats {
+            return Ok(lambda);
+        }
+        for _ in 0..MOST_PASSES {
+            let mut r: Vec<Vec3> =
+                c.iter().zip(self.transposed_of_unknowns(&lambda)).map(|(c, done)| c - done).collect();
+            apply_inverse(&mut r);
+            let (mut size, mut correction) = (0.0_f64, 0.0_f64);
+            for (l, r) in lambda.iter_mut().zip(&r) {
+                *l += r;
+                size = size.max(l.norm());
+                correction = correction.max(r.norm());
+            }
+            if correction <= SETTLED * size {
+                return Ok(lambda);
+            }
+        }
+        Err(too_strong())
+    }
+}
+
+/// What is left to do for each input.
+struct Contraction<'a> {
+    place: &'a Place<'a>,
+    lambda: &'a [Vec3],
+    /// Coefficients of the nodal gradient.
+    xi: &'a [Vec3],
+    /// Coefficients of the nodal positions, `xi` contracted with the stiffness included.
+    q: &'a [Vec3],
+    /// Coefficients of the current pivots.
+    pivot: &'a [Vec3],
+}
+
+impl Contraction<'_> {
+    fn by(&self, slot: Slot, out: &mut [f64]) {
+        let parts = self.place.model.parts();
+        match slot {
+            Slot::BoneTranslation | Slot::BoneRotation | Slot::BoneForce | Slot::BoneTorque | Slot::BonePivot => {
+                for (b, row) in out.chunks_exact_mut(3).enumerate() {
+                    row.copy_from_slice(self.by_bone(slot, b).as_slice());
+                }
+            }
+            Slot::BoneNodal(b) => {
+                for (&a, row) in parts.bones[b as usize].nodes.iter().zip(out.chunks_exact_mut(3)) {
+                    row.copy_from_slice(self.q[a as usize].as_slice());
+                }
+            }
+            read_by_terms => {
+                let first = parts.layout.first(read_by_terms).expect("every other known is an input of terms");
+                for (k, out) in (first..).zip(out) {
+                    *out = self.by_input(k);
+                }
+            }
+        }
+    }
+
+    fn by_bone(&self, slot: Slot, b: usize) -> Vec3 {
+        let Place { model, config, g, at, .. } = self.place;
+        let bone = &model.parts().bones[b];
+        let q = |a: &u32| self.q[*a as usize];
+        let body = model.dofs().bodies.iter().find(|body| body.bone == b);
+        let pushed = || bone.nodes.iter().map(q).sum::<Vec3>();
+        match slot {
+            Slot::BoneTranslation if bone.drive == Drive::Pose => pushed() + self.pivot[b],
+            Slot::BoneRotation if bone.drive == Drive::Pose => {
+                let first = model.parts().layout.first(slot).expect("a port of the model") + 3 * b;
+                let w = Vec3::from_column_slice(&at.inputs[first..first + 3]);
+                let twist: Vec3 = bone.nodes.iter().map(|a| self.place.arm(b, *a).cross(&q(a))).sum();
+                left_jacobian(&w).tr_mul(&twist)
+            }
+            Slot::BoneForce => body.map_or(Vec3::zeros(), |body| -self.lambda[body.block as usize]),
+            Slot::BoneTorque => body.map_or(Vec3::zeros(), |body| -self.lambda[body.block as usize + 1]),
+            Slot::BonePivot => {
+                // dx = (I - R) dp, and the arms of a force-driven bone turn by -R dp.
+                let Pose { R, .. } = config.poses[b];
+                let mut by = (Mat3::identity() - R).tr_mul(&pushed()) + self.pivot[b];
+                if let Some(body) = body {
+                    let held: Vec3 = bone.nodes.iter().map(|&a| g[a as usize]).sum();
+                    by -= R.tr_mul(&held.cross(&self.lambda[body.block as usize + 1]));
+                }
+                by
+            }
+            _ => Vec3::zeros(),
+        }
+    }
+
+    /// `xi . dg/ds_k`, by a difference of the terms that read it.
+    fn by_input(&self, k: usize) -> f64 {
+        let Place { model, config, at, .. } = self.place;
+        let mut inputs = at.inputs.to_vec();
+        let h = at.inputs[k].abs().max(1.0);
+        let mut g = vec![Vec3::zeros(); config.x.len()];
+        let mut side = |value: f64| {
+            inputs[k] = value;
+            let at = At { inputs: &inputs, ..*at };
+            g.fill(Vec3::zeros());
+            for term in model.parts().terms.iter().filter(|t| t.inputs().contains(&k)) {
+                term.add_gradient(&at, &config.x, &mut g);
+            }
+            g.iter().zip(self.xi).map(|(g, xi)| g.dot(xi)).sum::<f64>()
+        };
+        let value = at.inputs[k];
+        (side(value + h) - side(value - h)) / (2.0 * h)
+    }
+}
+
+/// `dR(w) = skew(J dw) R(w)`. Source: Barfoot, "State Estimation for Robotics", 2017, section 7.1.
+fn left_jacobian(w: &Vec3) -> Mat3 {
+    let angle = w.norm();
+    let (a, b) = if angle < 1e-3 {
+        let q = angle * angle;
+        (0.5 - q / 24.0, 1.0 / 6.0 - q / 120.0)
+    } else {
+        ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / angle.powi(3))
+    };
+    let W = skew(w);
+    Mat3::identity() + a * W + b * W * W
+}
