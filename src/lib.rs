@@ -13,6 +13,7 @@
     clippy::unimplemented
 )]
 
+pub mod bench;
 pub mod bytes;
 pub mod compare;
 pub mod effect;
@@ -30,5 +31,6 @@ pub mod port;
 pub mod scene;
 pub mod sim;
 pub mod solve;
+pub mod study;
 pub mod torture;
 pub mod view;

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::geometry::{Block, Head, Pattern, block};
 use crate::io;
 use crate::mesh::{FineSkin, TetMesh};
-use crate::scene::{MeshSource, Programme, SceneError, SceneFile, SkinSource, build};
+use crate::scene::{self, MeshSource, Programme, SceneError, SceneFile, SkinSource, SmallStrain, build};
 use crate::sim::Model;
 
 /// The scene that stands in the library itself: the synthetic head.
@@ -47,6 +47,35 @@ pub fn from_file(scene: &Path) -> Result<Loaded, Error> {
 /// [`Error`].
 pub fn from_text(text: &str, folder: Option<&Path>) -> Result<Loaded, Error> {
     load(text, Path::new("<text>"), folder)
+}
+
+/// The same with this skin in place of the scene's own, whatever the mesh.
+///
+/// # Errors
+/// [`Error`].
+pub fn with_skin(text: &str, folder: Option<&Path>, skin: FineSkin) -> Result<Loaded, Error> {
+    let path = Path::new("<text>");
+    let file = parse(text, path)?;
+    let mesh = TetMesh { fine_skin: Some(skin), ..mesh_of(text, &file, path, folder)? };
+    let (model, programme) = build(text, &file, mesh).map_err(|e| scene_error(path, e))?;
+    Ok(Loaded { model, programme })
+}
+
+/// Small-strain constants of the tissues of a scene, in order.
+///
+/// # Errors
+/// [`Error`].
+pub fn small_strain(text: &str) -> Result<Vec<SmallStrain>, Error> {
+    let path = Path::new("<text>");
+    scene::small_strain(text, &parse(text, path)?).map_err(|e| scene_error(path, e))
+}
+
+/// A mesh file that a scene names, relative to `folder`.
+///
+/// # Errors
+/// [`Error`].
+pub fn mesh_file(folder: Option<&Path>, name: &str) -> Result<TetMesh, Error> {
+    Ok(io::read_mesh(&beside(folder, name))?)
 }
 
 /// Loads the default scene.

@@ -9,6 +9,7 @@ macro_rules! say {
 }
 
 mod bake;
+mod bench;
 mod check;
 mod demo;
 mod fmu;
@@ -16,6 +17,7 @@ mod output;
 mod presets;
 mod progress;
 mod run;
+mod study;
 mod torture;
 
 use std::process::ExitCode;
@@ -47,8 +49,12 @@ enum Command {
     Check(check::Check),
     /// Print the tissues that a scene can name, with their sources
     Presets(presets::Presets),
+    /// Run a scene over a ladder of methods: what accuracy costs in time, and what a budget buys
+    Study(study::Study),
     /// Run the catalogue of hard cases and say how each ends
     Torture(torture::Torture),
+    /// Measure a step and its parts against what this machine allows
+    Bench(bench::Bench),
 }
 
 /// Runs the command that the arguments name.
@@ -61,6 +67,8 @@ pub fn run() -> ExitCode {
         Command::Check(check) => check.run(),
         Command::Presets(presets) => presets.run(),
         Command::Torture(torture) => torture.run(),
+        Command::Study(study) => study.run(),
+        Command::Bench(bench) => bench.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

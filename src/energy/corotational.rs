@@ -10,14 +10,38 @@
 //! Barbic, "Exact corotational linear FEM stiffness matrix", 2012. The tangent holds dR/dF.
 //! Departure: R comes from the rotation-variant SVD, so the energy stays finite and smooth through inversion.
 
-use super::{Energy, Lame};
+use pulp::Simd;
+
+use super::{Energy, Lame, lane_by_lane};
+use crate::math::lane::{Lane, Real, Tensor, cofactors, det, dot3, norm_squared, tensor};
 use crate::math::{Mat3, Mat9, Vec3, Vec9, outer, skew, svd, vec9};
 
 /// Sum of two principal stretches below which the rotation's rate is bounded (inverted elements only).
 const LEAST_STRETCH_SUM: f64 = 1e-3;
 
+/// Iterations after which stretches from 1/50 to 50 are rotations to round-off.
+const ITERATIONS: usize = 9;
+/// Squared distance from its cofactors at which a matrix counts as a rotation.
+const ORTHOGONAL: f64 = 1e-26;
+
 /// Corotational elasticity with Lame's constants, Pa.
 pub struct Corotational(pub Lame);
+
+/// R of F = R S by Newton's iteration for the polar decomposition, and how far R is from a rotation; it is far where F is
+/// inverted, flat or stretched a hundredfold.
+///
+/// Source: Higham, "Computing the polar decomposition - with applications", SIAM J. Sci. Stat. Comput. 7(4), 1986.
+#[inline(always)]
+fn rotations<S: Simd>(F: &Tensor<Lane<S>>) -> (Tensor<Lane<S>>, Lane<S>) {
+    let mut R = *F;
+    for _ in 0..ITERATIONS {
+        let g = cofactors(&R);
+        let half = det(&R, &g).map(f64::recip) * 0.5;
+        R = tensor!(|i, j| half.mul_add(g[i][j], R[i][j] * 0.5));
+    }
+    let g = cofactors(&R);
+    (R, norm_squared(&tensor!(|i, j| R[i][j] - g[i][j])))
+}
 
 impl Energy for Corotational {
     const NAME: &'static str = "corotational";
@@ -35,6 +59,19 @@ impl Energy for Corotational {
         let stretch = f.s - Vec3::repeat(1.0);
         let psi = mu * stretch.norm_squared() + 0.5 * lambda * stretch.sum().powi(2);
         (psi, 2.0 * mu * (F - R) + lambda * stretch.sum() * R)
+    }
+    #[inline(always)]
+    fn psi_and_P_in<S: Simd>(&self, simd: S, F: &Tensor<Lane<S>>) -> (Lane<S>, Tensor<Lane<S>>) {
+        let Lame { mu, lambda } = self.0;
+        let (R, off) = rotations(F);
+        if off.largest() < ORTHOGONAL {
+            let stretched = tensor!(|i, j| F[i][j] - R[i][j]);
+            // tr S - 3 = R : (F - R), with no digits lost to the three.
+            let sum = dot3(&R[0], &stretched[0]) + dot3(&R[1], &stretched[1]) + dot3(&R[2], &stretched[2]);
+            let psi = (norm_squared(&stretched) * mu) + (sum * sum) * (0.5 * lambda);
+            return (psi, tensor!(|i, j| (sum * lambda).mul_add(R[i][j], stretched[i][j] * (2.0 * mu))));
+        }
+        lane_by_lane(simd, F, |_, F| self.psi_and_P(F))
     }
     fn dPdF(&self, F: &Mat3) -> Mat9 {
         let f = svd(F);

@@ -14,6 +14,7 @@ pub struct Fung {
 
 impl Isochoric for Fung {
     const NAME: &'static str = "fung";
+    const OF_I1_ALONE: bool = true;
 
     fn W(&self, I1b: f64, _I2b: f64) -> f64 {
         0.5 * self.mu / self.b * (self.b * (I1b - 3.0)).exp_m1()

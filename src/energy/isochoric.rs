@@ -7,7 +7,10 @@
 //!
 //! Source: Holzapfel, "Nonlinear Solid Mechanics", 2000, sections 6.4-6.5.
 
-use super::Energy;
+use pulp::Simd;
+
+use super::{Energy, InvariantTangent};
+use crate::math::lane::{BATCH, Lane, Real, Tensor, cofactors, det, norm_squared, tensor};
 use crate::math::{Mat3, Mat9, cofactor, d2JdF2, outer};
 
 /// First and second derivatives of a function of (I1b, I2b).
@@ -23,6 +26,8 @@ pub struct Slopes {
 pub trait Isochoric: Send + Sync {
     /// Name by which a scene chooses it.
     const NAME: &'static str;
+    /// Whether it does not depend on I2b.
+    const OF_I1_ALONE: bool = false;
     /// W(I1b, I2b), J/m3; zero at (3, 3).
     fn W(&self, I1b: f64, I2b: f64) -> f64;
     /// Its derivatives, Pa.
@@ -122,4 +127,59 @@ impl<L: Isochoric> Energy for WithBulk<L> {
             + w22 * outer(&b.first, &b.first)
             + self.kappa * (outer(&g, &g) + (J - 1.0) * d2JdF2(F))
     }
+    #[inline(always)]
+    fn psi_and_P_in<S: Simd>(&self, simd: S, F: &Tensor<Lane<S>>) -> (Lane<S>, Tensor<Lane<S>>) {
+        let g = cofactors(F);
+        let (J, I1) = (det(F, &g), norm_squared(F));
+        let C = tensor!(|i, j| F[0][i].mul_add(F[0][j], F[1][i].mul_add(F[1][j], F[2][i] * F[2][j])));
+        let I2 = (I1 * I1 - norm_squared(&C)) * 0.5;
+        // psi, and P = 2 a F + 2 b (I1 F - F C) + c g.
+        let (mut psi, mut a, mut b, mut c) = ([0.0; BATCH], [0.0; BATCH], [0.0; BATCH], [0.0; BATCH]);
+        for (lane, [J, I1, I2]) in lanes([J, I1, I2]).into_iter().take(S::F64_LANES).enumerate() {
+            if J <= 0.0 {
+                psi[lane] = f64::INFINITY;
+                continue;
+            }
+            let j = J.cbrt().powi(-2);
+            let (I1b, I2b) = (j * I1, j * j * I2);
+            let [w1, w2] = self.law.slopes(I1b, I2b).first;
+            psi[lane] = self.law.W(I1b, I2b) + 0.5 * self.kappa * (J - 1.0).powi(2);
+            (a[lane], b[lane]) = (w1 * j, w2 * j * j);
+            c[lane] = self.kappa * (J - 1.0) - (2.0 / 3.0 * w1 * I1b + 4.0 / 3.0 * w2 * I2b) / J;
+        }
+        let [psi, a, b, c] = [psi, a, b, c].map(|v| Lane::load(simd, &v, 0));
+        let (of_F, of_FC) = ((b.mul_add(I1, a)) * 2.0, b * -2.0);
+        let FC = tensor!(|i, j| F[i][0].mul_add(C[0][j], F[i][1].mul_add(C[1][j], F[i][2] * C[2][j])));
+        (psi, tensor!(|i, j| of_F.mul_add(F[i][j], of_FC.mul_add(FC[i][j], c * g[i][j]))))
+    }
+    const IN_INVARIANTS: bool = L::OF_I1_ALONE;
+    #[inline(always)]
+    fn tangent_in<S: Simd>(&self, simd: S, F: &Tensor<Lane<S>>, g: &Tensor<Lane<S>>) -> InvariantTangent<Lane<S>> {
+        let (J, I1) = (det(F, g), norm_squared(F));
+        let mut out = [[0.0; BATCH]; 5];
+        for (lane, [J, I1]) in lanes([J, I1]).into_iter().take(S::F64_LANES).enumerate() {
+            let j = J.cbrt().powi(-2);
+            let I1b = j * I1;
+            let Slopes { first: [w, _], second: [w2, ..] } = self.law.slopes(I1b, 0.0);
+            // By J at fixed I1.
+            let (d1, d2) = (-2.0 / 3.0 * I1b / J, 10.0 / 9.0 * I1b / (J * J));
+            out[0][lane] = 2.0 * w * j;
+            out[1][lane] = 4.0 * w2 * j * j;
+            out[2][lane] = 2.0 * (w2 * j * d1 - 2.0 / 3.0 * w * j / J);
+            out[3][lane] = w2 * d1 * d1 + w * d2 + self.kappa;
+            out[4][lane] = w * d1 + self.kappa * (J - 1.0);
+        }
+        let [one, ff, fg, gg, spin] = out.map(|v| Lane::load(simd, &v, 0));
+        InvariantTangent { one, ff, fg, gg, spin }
+    }
+}
+
+/// The numbers of each lane.
+#[inline(always)]
+fn lanes<S: Simd, const N: usize>(of: [Lane<S>; N]) -> [[f64; N]; BATCH] {
+    let mut stored = [[0.0; BATCH]; N];
+    for (to, from) in stored.iter_mut().zip(of) {
+        from.store(to, 0);
+    }
+    std::array::from_fn(|lane| std::array::from_fn(|n| stored[n][lane]))
 }

@@ -58,6 +58,41 @@ pub trait Energy: Send + Sync {
     }
     /// Tangent d2 psi / dF2 over `vec(F)`, Pa.
     fn dPdF(&self, F: &Mat3) -> Mat9;
+    /// Whether the law is a function of |F|^2 and J alone and says its tangent as such.
+    const IN_INVARIANTS: bool = false;
+    /// Tangent in many points at once, where J is positive; asked only of laws [`Energy::IN_INVARIANTS`].
+    #[inline(always)]
+    fn tangent_in<S: Simd>(&self, simd: S, _F: &Tensor<Lane<S>>, _g: &Tensor<Lane<S>>) -> InvariantTangent<Lane<S>> {
+        InvariantTangent::zero(Lane::splat(simd, 0.0))
+    }
+}
+
+/// Tangent of a law psi(I1, J) with I1 = |F|^2 and g = dJ/dF, Pa:
+///
+/// ```text
+/// dP/dF = one 1 + ff F (x) F + fg (F (x) g + g (x) F) + gg g (x) g + spin d2J/dF2
+/// one = 2 psi_1, ff = 4 psi_11, fg = 2 psi_1J, gg = psi_JJ, spin = psi_J
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct InvariantTangent<T> {
+    /// Of the identity.
+    pub one: T,
+    /// Of F with itself.
+    pub ff: T,
+    /// Of F with g.
+    pub fg: T,
+    /// Of g with itself.
+    pub gg: T,
+    /// Of the second derivative of J.
+    pub spin: T,
+}
+
+impl<T: Copy> InvariantTangent<T> {
+    /// With every coefficient the given zero.
+    #[inline(always)]
+    pub fn zero(zero: T) -> Self {
+        InvariantTangent { one: zero, ff: zero, fg: zero, gg: zero, spin: zero }
+    }
 }
 
 /// `psi_and_P` of each lane and its F.

@@ -6,7 +6,7 @@
 //!
 //! Source: Bonet & Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", 2nd ed., 2008, eq. 6.27.
 
-use super::{Energy, Lame};
+use super::{Energy, InvariantTangent, Lame};
 use crate::math::lane::{Lane, Real, Tensor, cofactors, det, norm_squared, tensor};
 use crate::math::{Mat3, Mat9, cofactor, d2JdF2, entries, mat3, outer};
 
@@ -51,5 +51,23 @@ impl Energy for NeoHookean {
         let slope = (lambda * J.ln() - mu) / J;
         let bend = (lambda - lambda * J.ln() + mu) / (J * J);
         mu * Mat9::identity() + bend * outer(&g, &g) + slope * d2JdF2(F)
+    }
+    const IN_INVARIANTS: bool = true;
+    #[inline(always)]
+    fn tangent_in<S: pulp::Simd>(
+        &self,
+        simd: S,
+        F: &Tensor<Lane<S>>,
+        g: &Tensor<Lane<S>>,
+    ) -> InvariantTangent<Lane<S>> {
+        let Lame { mu, lambda } = self.0;
+        let J = det(F, g);
+        let (lnJ, per_J) = (J.map(f64::ln), J.map(f64::recip));
+        InvariantTangent {
+            one: Lane::splat(simd, mu),
+            gg: (lnJ * -lambda + (lambda + mu)) * per_J * per_J,
+            spin: (lnJ * lambda - mu) * per_J,
+            ..InvariantTangent::zero(Lane::splat(simd, 0.0))
+        }
     }
 }

@@ -8,7 +8,7 @@
 //! Departure: the paper's logarithm is left out, and `lambda + mu` takes the place of its lambda so that small strains
 //! agree with `Linear`; the constant is chosen so that psi(I) = 0.
 
-use super::{Energy, Lame};
+use super::{Energy, InvariantTangent, Lame};
 use crate::math::lane::{Lane, Real, Tensor, cofactors, det, norm_squared, tensor};
 use crate::math::{Mat3, Mat9, cofactor, d2JdF2, entries, mat3, outer};
 
@@ -16,6 +16,7 @@ use crate::math::{Mat3, Mat9, cofactor, d2JdF2, entries, mat3, outer};
 pub struct StableNeoHookean(pub Lame);
 
 impl StableNeoHookean {
+    #[inline(always)]
     fn dpsi_dJ<T: Real>(&self, J: T) -> T {
         (J - 1.0) * (self.0.lambda + self.0.mu) - self.0.mu
     }
@@ -53,5 +54,21 @@ impl Energy for StableNeoHookean {
         self.0.mu * Mat9::identity()
             + (self.0.lambda + self.0.mu) * outer(&g, &g)
             + self.dpsi_dJ(F.determinant()) * d2JdF2(F)
+    }
+    const IN_INVARIANTS: bool = true;
+    #[inline(always)]
+    fn tangent_in<S: pulp::Simd>(
+        &self,
+        simd: S,
+        F: &Tensor<Lane<S>>,
+        g: &Tensor<Lane<S>>,
+    ) -> InvariantTangent<Lane<S>> {
+        let Lame { mu, lambda } = self.0;
+        InvariantTangent {
+            one: Lane::splat(simd, mu),
+            gg: Lane::splat(simd, lambda + mu),
+            spin: self.dpsi_dJ(det(F, g)),
+            ..InvariantTangent::zero(Lane::splat(simd, 0.0))
+        }
     }
 }

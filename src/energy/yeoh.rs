@@ -16,6 +16,7 @@ pub struct Yeoh {
 
 impl Isochoric for Yeoh {
     const NAME: &'static str = "yeoh";
+    const OF_I1_ALONE: bool = true;
 
     fn W(&self, I1b: f64, _I2b: f64) -> f64 {
         let k = I1b - 3.0;

@@ -64,6 +64,12 @@ impl Assembly {
         Assembly { K, K_p, places }
     }
 
+    /// Bytes of the matrices and of the places in them.
+    pub fn memory(&self) -> usize {
+        let blocks = self.K.blocks.len() + self.K_p.blocks.len();
+        blocks * (size_of::<Mat3>() + size_of::<u32>()) + size_of_val(&self.places[..])
+    }
+
     /// Fills the matrices at `config`; `g` is the nodal gradient there (rigid bodies turn it into curvature).
     #[allow(clippy::too_many_arguments)] // each is one symbol of K(x; terms, dofs)
     pub fn fill(

@@ -1,11 +1,13 @@
-//! Elements side by side: shape gradients in batches of eight, and the gradient loop over them.
+//! Elements side by side: shape gradients in batches of eight, and the loops over them.
 
 use pulp::{Arch, Simd, WithSimd};
 
 use super::solid::{Material, Point};
-use super::{At, Solid};
-use crate::math::Vec3;
+use super::term::MAX_BLOCKS;
+use super::{At, HessianSink, Solid};
+use crate::energy::InvariantTangent;
 use crate::math::lane::{BATCH, Lane, Real, Tensor, cofactors, det, dot3, tensor};
+use crate::math::{Mat3, Vec3};
 
 /// Shape gradients and weights of elements with N nodes and Q points, eight elements side by side. The gradient of the
 /// first node is minus the sum of the others'.
@@ -176,6 +178,115 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for AddGradient<'_, M
             }
         }
         energy.sum()
+    }
+}
+
+/// Hands the Hessians of all elements to `sink`, for laws of |F|^2 and J:
+///
+/// ```text
+/// K_ab = sum_q w (one (dN_a . dN_b) 1 + ff Fa Fb^T + fg (Fa gb^T + ga Fb^T) + gg ga gb^T + spin [F (dN_a x dN_b)]x)
+/// Fa = F dN_a,   ga = g dN_a,   ([v]x)_ik = eps_ikm v_m
+/// ```
+pub(super) struct AddHessian<'a, M, const N: usize, const Q: usize> {
+    pub solid: &'a Solid<M, N, Q>,
+    pub x: &'a [Vec3],
+    pub sink: &'a mut dyn HessianSink,
+}
+
+impl<M: Material, const N: usize, const Q: usize> AddHessian<'_, M, N, Q> {
+    pub fn run(self) {
+        Arch::new().dispatch(self);
+    }
+}
+
+/// `A v`.
+#[inline(always)]
+fn apply<T: Real>(A: &Tensor<T>, v: &[T; 3]) -> [T; 3] {
+    [dot3(&A[0], v), dot3(&A[1], v), dot3(&A[2], v)]
+}
+
+/// `a x b`.
+#[inline(always)]
+fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+impl<M: Material, const N: usize, const Q: usize> WithSimd for AddHessian<'_, M, N, Q> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let AddHessian { solid, x, sink } = self;
+        // Blocks of a batch by entry, and those of one element.
+        let mut blocks = [[[0.0; BATCH]; 9]; MAX_BLOCKS];
+        let mut upper = [Mat3::zeros(); MAX_BLOCKS];
+        let n_blocks = N * (N + 1) / 2;
+        let batches = solid.nodes.chunks(BATCH).zip(solid.points.values.chunks_exact(Q * Points::<N, Q>::LEN));
+        for (nodes, points) in batches {
+            let places = gather(nodes, x);
+            for k in 0..BATCH / S::F64_LANES {
+                let vector = Vector::<S, N, Q>::new(simd, k, &places, points);
+                for q in 0..Q {
+                    let F = vector.F(q);
+                    let g = cofactors(&F);
+                    let w = vector.w(q);
+                    let t = solid.material.tangent_in(simd, &F, &g);
+                    let InvariantTangent { one, ff, fg, gg, spin } =
+                        InvariantTangent { one: w * t.one, ff: w * t.ff, fg: w * t.fg, gg: w * t.gg, spin: w * t.spin };
+                    let mut dN = [[Lane::splat(simd, 0.0); 3]; N];
+                    for a in 1..N {
+                        dN[a] = vector.dN(q, a);
+                        for c in 0..3 {
+                            dN[0][c] = dN[0][c] - dN[a][c];
+                        }
+                    }
+                    let mut along = [([Lane::splat(simd, 0.0); 3], [Lane::splat(simd, 0.0); 3]); N];
+                    for (along, dN) in along.iter_mut().zip(&dN) {
+                        *along = (apply(&F, dN), apply(&g, dN));
+                    }
+                    let mut block = blocks.iter_mut();
+                    for a in 0..N {
+                        let (Fa, ga) = &along[a];
+                        let mut rows = [([Lane::splat(simd, 0.0); 2]); 3];
+                        for (row, (Fa, ga)) in rows.iter_mut().zip(Fa.iter().zip(ga)) {
+                            *row = [ff.mul_add(*Fa, fg * *ga), fg.mul_add(*Fa, gg * *ga)];
+                        }
+                        for b in a..N {
+                            let (Fb, gb) = &along[b];
+                            let block = block.next().expect("a block for each pair of nodes");
+                            let diagonal = one * dot3(&dN[a], &dN[b]);
+                            let v = apply(&F, &cross(&dN[a], &dN[b]));
+                            let v = [spin * v[0], spin * v[1], spin * v[2]];
+                            for i in 0..3 {
+                                for j in 0..3 {
+                                    let mut entry = rows[i][0].mul_add(Fb[j], rows[i][1] * gb[j]);
+                                    if i == j {
+                                        entry = entry + diagonal;
+                                    } else if (i + 1) % 3 == j {
+                                        entry = entry + v[(j + 1) % 3];
+                                    } else {
+                                        entry = entry - v[(i + 1) % 3];
+                                    }
+                                    let to = &mut block[i + 3 * j];
+                                    if q > 0 {
+                                        entry = entry + Lane::load(simd, to, k);
+                                    }
+                                    entry.store(to, k);
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+            for (lane, nodes) in nodes.iter().enumerate() {
+                for (upper, block) in upper[..n_blocks].iter_mut().zip(&blocks) {
+                    for (to, from) in upper.as_mut_slice().iter_mut().zip(block) {
+                        *to = from[lane];
+                    }
+                }
+                sink.add(nodes, &upper[..n_blocks]);
+            }
+        }
     }
 }
 

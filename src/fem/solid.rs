@@ -8,9 +8,10 @@
 
 use pulp::Simd;
 
-use super::batch::{AddGradient, MinDetF, Points};
-use super::{At, Curvature, Kernel, Strain};
-use crate::energy::{Energy, lane_by_lane};
+use super::batch::{AddGradient, AddHessian, MinDetF, Points};
+use super::term::each_hessian;
+use super::{At, Curvature, HessianSink, Kernel, Strain};
+use crate::energy::{Energy, InvariantTangent, lane_by_lane};
 use crate::math::lane::{Lane, Tensor};
 use crate::math::{Mat3, Mat9, Vec3, clamp_eigenvalues};
 
@@ -38,6 +39,18 @@ pub trait Material: Send + Sync {
     }
     /// Tangent over `vec(F)`, Pa.
     fn dPdF(&self, at: &At, p: usize, F: &Mat3) -> Mat9;
+    /// Whether `tangent_in` says the tangent.
+    fn is_in_invariants(&self) -> bool {
+        false
+    }
+    /// Tangent of a function of |F|^2 and J, in many points at once; asked only where `is_in_invariants`.
+    #[inline(always)]
+    fn tangent_in<S: Simd>(&self, simd: S, _F: &Tensor<Lane<S>>, _g: &Tensor<Lane<S>>) -> InvariantTangent<Lane<S>>
+    where
+        Self: Sized,
+    {
+        InvariantTangent::zero(Lane::splat(simd, 0.0))
+    }
     /// Whether its tangent is the same at every F.
     fn is_quadratic(&self) -> bool {
         false
@@ -106,6 +119,13 @@ impl<M: Energy> Material for Elastic<M> {
     }
     fn dPdF(&self, _at: &At, _p: usize, F: &Mat3) -> Mat9 {
         self.0.dPdF(F)
+    }
+    fn is_in_invariants(&self) -> bool {
+        M::IN_INVARIANTS
+    }
+    #[inline(always)]
+    fn tangent_in<S: Simd>(&self, simd: S, F: &Tensor<Lane<S>>, g: &Tensor<Lane<S>>) -> InvariantTangent<Lane<S>> {
+        self.0.tangent_in(simd, F, g)
     }
     fn is_quadratic(&self) -> bool {
         M::NAME == crate::energy::Linear::NAME
@@ -189,6 +209,13 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
                     }
                 }
             }
+        }
+    }
+    fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
+        if curvature == Curvature::Exact && self.material.is_in_invariants() {
+            AddHessian { solid: self, x, sink }.run();
+        } else {
+            each_hessian(self, at, x, curvature, sink);
         }
     }
     fn strain(&self, at: &At, e: usize, x: &[Vec3; N]) -> Strain {

@@ -149,6 +149,13 @@ pub trait Kernel<const N: usize>: Send + Sync {
     }
     /// Upper triangle of Hessian blocks of element `e`, row by row, N/m.
     fn hessian(&self, at: &At, e: usize, x: &[Vec3; N], curvature: Curvature, upper: &mut [Mat3]);
+    /// Hands the Hessians of all elements over, element after element.
+    fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink)
+    where
+        Self: Sized,
+    {
+        each_hessian(self, at, x, curvature, sink);
+    }
     /// Strain of element `e`.
     fn strain(&self, at: &At, e: usize, x: &[Vec3; N]) -> Strain;
     /// Whether the energy is quadratic in the positions.
@@ -162,7 +169,24 @@ pub trait Kernel<const N: usize>: Send + Sync {
 }
 
 /// Upper-triangle blocks of the largest element, the ten-node tetrahedron.
-const MAX_BLOCKS: usize = 55;
+pub(super) const MAX_BLOCKS: usize = 55;
+
+/// Hessians made one element after the other.
+pub(super) fn each_hessian<K: Kernel<N>, const N: usize>(
+    kernel: &K,
+    at: &At,
+    x: &[Vec3],
+    curvature: Curvature,
+    sink: &mut dyn HessianSink,
+) {
+    let mut upper = [Mat3::zeros(); MAX_BLOCKS];
+    let upper = &mut upper[..N * (N + 1) / 2];
+    for e in 0..kernel.len() {
+        let nodes = kernel.nodes(e);
+        kernel.hessian(at, e, &nodes.map(|a| x[a as usize]), curvature, upper);
+        sink.add(&nodes, upper);
+    }
+}
 
 /// A kernel summed over its elements. Elements are visited in ascending order, so sums are reproducible to the bit.
 pub struct OnElements<K, const N: usize>(pub K);
@@ -198,13 +222,7 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
     }
 
     fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
-        let mut upper = [Mat3::zeros(); MAX_BLOCKS];
-        let upper = &mut upper[..N * (N + 1) / 2];
-        for e in 0..self.0.len() {
-            let (nodes, x) = self.gather(e, x);
-            self.0.hessian(at, e, &x, curvature, upper);
-            sink.add(&nodes, upper);
-        }
+        self.0.add_hessian(at, x, curvature, sink);
     }
 
     fn is_quadratic(&self) -> bool {

@@ -70,6 +70,13 @@ impl<S: Simd> Lane<S> {
     pub fn least(self) -> f64 {
         self.simd.reduce_min_f64s(self.v)
     }
+    /// Largest of the lanes; +inf if one is no number.
+    #[inline(always)]
+    pub fn largest(self) -> f64 {
+        let mut lanes = [0.0; BATCH];
+        self.store(&mut lanes, 0);
+        lanes.iter().fold(f64::NEG_INFINITY, |m, v| if v.is_nan() { f64::INFINITY } else { m.max(*v) })
+    }
     /// The smaller number of each lane.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {

@@ -206,7 +206,7 @@ pub const KEYS: &[Key] = &[
     key("inertia", "damping_stiffness", "float", "s", NonNegative, "0", "Damping stress in units of the small-strain stiffness times strain rate; rotations feel nothing."),
     key("inertia", "accuracy", "float", "m", Positive, "none", "Cuts each step into as many pieces (256 at most) as keep the estimated error of a piece below this; at least ten times the solver's `tolerance`."),
     key("attachment", "free_rings", "integer", "", NonNegative, "0", "Bone nodes that two bones claim, or within this many edges of another bone, are set free (osteotomy lines, joints)."),
-    key("solver", "method", "string", "", OneOf(&["quasi-newton", "newton"]), "\"quasi-newton\"", "L-BFGS over a kept factor, or Newton with a new factor in every iteration."),
+    key("solver", "method", "string", "", OneOf(&["quasi-newton", "newton"]), "\"quasi-newton\"", "L-BFGS over a kept factor (scenes that are linear in their inputs are read off a table instead), or Newton with a new factor in every iteration."),
     key("solver", "tolerance", "float", "m", Positive, "1e-7", "Largest nodal motion of the last correction."),
     key("solver", "max_iterations", "integer", "", AtLeastOne, "200", "Most linear solves in one piece of a step."),
     key("solver", "inversion", "string", "", OneOf(&["refuse", "allow"]), "\"refuse\"", "Whether a step that can only end with elements turned inside out is refused, or taken and told where the law has an energy for it (`linear` tissue alone always may)."),

@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 
 use super::SceneError;
 use super::build::Builder;
+use super::check::Text;
 use super::file::{BoneSpec, MuscleSpec, SceneFile, TissueSpec, ViscousSpec};
 use super::keys::find;
 use super::tissue::{Fields, Terms};
@@ -15,6 +16,8 @@ use crate::mesh::TetMesh;
 
 /// Above this Poisson's ratio linear tetrahedra lock visibly.
 const LOCKING_NU: f64 = 0.45;
+/// Density of tissue that the scene says nothing of, kg/m3.
+const WATER: f64 = 1000.0;
 
 /// What the materials of a scene come to.
 pub(super) struct Tissue {
@@ -22,6 +25,40 @@ pub(super) struct Tissue {
     /// By region, kg/m3.
     pub density: Vec<f64>,
     pub n_history: usize,
+}
+
+/// What a tissue is to small strains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SmallStrain {
+    /// Young's modulus, Pa.
+    pub E: f64,
+    /// Poisson's ratio; that of a lattice, 1/4, for tissue made of springs.
+    pub nu: f64,
+    /// Density, kg/m3.
+    pub density: f64,
+}
+
+/// Small-strain constants of each tissue of a scene `text`.
+///
+/// # Errors
+/// [`SceneError`] with line and column.
+pub fn small_strain(text: &str, file: &SceneFile) -> Result<Vec<SmallStrain>, SceneError> {
+    let builder = Builder { text: Text(text) };
+    let of = |spec: &TissueSpec| {
+        let spec = &builder.with_preset(spec)?;
+        let density = builder.text.number("tissue", "density", &spec.density)?.unwrap_or(WATER);
+        if let Some(E) = builder.springs(spec, true)? {
+            return Ok(SmallStrain { E, nu: 0.25, density });
+        }
+        let (law, constants) = builder.law(spec)?;
+        let Lame { mu, lambda } = (law.moduli)(&constants);
+        Ok(SmallStrain {
+            E: mu * (3.0 * lambda + 2.0 * mu) / (lambda + mu),
+            nu: lambda / (2.0 * (lambda + mu)),
+            density,
+        })
+    };
+    file.tissue.iter().map(of).collect()
 }
 
 /// Corotational elements of unit stiffness and a Poisson's ratio of 0.3; with bones alone the stiffness does not matter.
@@ -76,7 +113,7 @@ impl Builder<'_> {
             let spec = &self.with_preset(spec)?;
             let mine = |r: u32| material[r as usize] == k;
             if let Some(E) = self.springs(spec, midsides.is_empty())? {
-                let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
+                let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(WATER);
                 density.iter_mut().enumerate().filter(|(r, _)| mine(*r as u32)).for_each(|(_, d)| *d = rho);
                 let elements = (0..mesh.tets.len()).filter(|&e| mine(mesh.region[e])).map(|e| mesh.tets[e]);
                 let tets: Vec<[u32; 4]> = elements.collect();
@@ -86,7 +123,7 @@ impl Builder<'_> {
             let (law, constants) = self.law(spec)?;
             let Lame { mu, lambda } = (law.moduli)(&constants);
             let nu = lambda / (2.0 * (lambda + mu));
-            let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(1000.0);
+            let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(WATER);
             let nodal = spec.pressure.as_ref().is_some_and(|p| p.get_ref() == "nodal");
             if nu > LOCKING_NU && midsides.is_empty() && !nodal {
                 warnings.push(format!(

@@ -24,6 +24,7 @@ mod tissue;
 pub use build::build;
 pub use file::SceneFile;
 pub use keys::{KEYS, Key, Range, key_reference, tables};
+pub use materials::{SmallStrain, small_strain};
 pub use presets::{Preset, preset_reference, presets};
 pub use programme::{Programme, Setting};
 pub use rest_shape::RestShapeError;

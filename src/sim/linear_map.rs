@@ -72,9 +72,12 @@ pub(super) struct LinearMap {
     corrections: Vec<f64>,
 }
 
-/// Causes of a scene that is linear in its inputs; none of one that is not.
+/// Causes of a scene that is linear in its inputs; none of one that is not, or that asks for Newton's method.
 fn causes(model: &Model) -> Option<Vec<Cause>> {
     let parts = model.parts();
+    if parts.strategy.memory == 0 {
+        return None;
+    }
     if !model.is_quadratic() || !model.has_derivatives() || !parts.muscles.is_empty() || !parts.pressures.is_empty() {
         return None;
     }

@@ -294,6 +294,11 @@ impl Sim {
         self.whole.get_or_init(|| self.save().config.x)
     }
 
+    /// Bytes of matrices, factor and solver, those of the model and of the state left out.
+    pub fn memory(&self) -> usize {
+        self.work.minimiser().memory()
+    }
+
     /// Stored entries of the stiffness matrix's factor (8 bytes each).
     pub fn factor_len(&self) -> usize {
         self.work.minimiser().factor_len()

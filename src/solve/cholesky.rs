@@ -80,6 +80,12 @@ impl Cholesky {
         })
     }
 
+    /// Bytes of the factor in both precisions and of the matrix that it is made from.
+    pub fn memory(&self) -> usize {
+        let scalar = self.values.len() * (size_of::<f64>() + size_of::<u32>());
+        size_of_val(&self.factor[..]) + scalar + self.panels.as_ref().map_or(0, Panels::memory)
+    }
+
     /// Stored entries of the factor.
     pub fn factor_len(&self) -> usize {
         self.factor.len()

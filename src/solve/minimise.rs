@@ -115,6 +115,12 @@ impl Minimiser {
         self.cholesky.factor_len()
     }
 
+    /// Bytes of the matrices, the factor and the vectors.
+    pub fn memory(&self) -> usize {
+        let vectors = 2 * self.nodal.len() * 2 + self.g.len() * (3 + 2 * self.strategy.memory);
+        self.assembly.memory() + self.cholesky.memory() + vectors * size_of::<Vec3>()
+    }
+
     /// Whether a factor is at hand.
     pub fn is_factored(&self) -> bool {
         self.factored

@@ -93,6 +93,11 @@ impl Panels {
         }
     }
 
+    /// Bytes of its numbers and rows.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.values[..]) + size_of_val(&self.rows[..])
+    }
+
     /// Takes the numbers of a factor of the same pattern.
     pub fn take(&mut self, symbolic: &SymbolicSupernodalCholesky<u32>, factor: &[f64]) {
         for (k, s) in self.supernodes.iter().enumerate() {

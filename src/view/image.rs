@@ -35,6 +35,29 @@ impl Image {
         self.paste(&Image::new(width, height, colour), x, y);
     }
 
+    /// Draws a line between two points (pixels), `width` pixels thick.
+    pub fn line(&mut self, from: (f64, f64), to: (f64, f64), width: usize, colour: Rgb) {
+        let steps = (to.0 - from.0).abs().max((to.1 - from.1).abs()).ceil().max(1.0);
+        let half = 0.5 * width as f64;
+        for k in 0..=steps as usize {
+            let s = k as f64 / steps;
+            let (x, y) = (from.0 + s * (to.0 - from.0) - half, from.1 + s * (to.1 - from.1) - half);
+            self.fill(x.max(0.0) as usize, y.max(0.0) as usize, width, width, colour);
+        }
+    }
+
+    /// Fills a disc about a point (pixels).
+    pub fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Rgb) {
+        let (top, bottom) = ((centre.1 - radius).floor().max(0.0), (centre.1 + radius).ceil().max(0.0));
+        for y in top as usize..self.height.min(bottom as usize + 1) {
+            let up = y as f64 + 0.5 - centre.1;
+            let half = (radius * radius - up * up).max(0.0).sqrt();
+            let from = (centre.0 - half).round().max(0.0) as usize;
+            let to = (centre.0 + half).round().max(0.0) as usize;
+            self.fill(from, y, to - from, 1, colour);
+        }
+    }
+
     /// Writes one line of capital letters, digits and signs, `scale` pixels a dot.
     pub fn text(&mut self, text: &str, x: usize, y: usize, scale: usize, colour: Rgb) {
         for (k, c) in text.chars().enumerate() {

@@ -1,0 +1,96 @@
+//! `cutis bench`: the time of a step and of its parts, beside what this machine allows.
+
+use cutis::bench::{SCENES, SIZES, Size, bandwidth, multiply_adds, parts, steps};
+
+/// Bytes far beyond any cache.
+const IN_MEMORY: usize = 256 << 20;
+/// Law of the parts.
+const LAW: &str = "stable-neo-hookean";
+
+#[derive(clap::Args)]
+pub struct Bench {
+    /// Scenes whose name holds this text; all if left out
+    scene: Option<String>,
+    /// Largest block: 1k, 10k, 50k or 200k tetrahedra
+    #[arg(long, default_value = "50k", value_parser = SIZES.map(|s| s.name))]
+    up_to: String,
+    /// Parts of a step only
+    #[arg(long, conflicts_with = "scene")]
+    parts: bool,
+    /// Do not compare with a solution to the last digits
+    #[arg(long)]
+    unchecked: bool,
+}
+
+impl Bench {
+    pub fn run(self) -> super::Done {
+        let largest = SIZES.iter().position(|s| s.name == self.up_to).unwrap_or(SIZES.len() - 1);
+        let sizes = &SIZES[..=largest];
+        say!(
+            "CPU time of one thread, median. This core reads {:.1} GB/s from memory and does {:.0} GF/s in single precision.\n",
+            1e-9 * bandwidth(IN_MEMORY),
+            1e-9 * multiply_adds()
+        );
+        if self.scene.is_none() {
+            table_of_parts(sizes)?;
+        }
+        if !self.parts {
+            self.table_of_steps(sizes)?;
+        }
+        Ok(())
+    }
+
+    fn table_of_steps(&self, sizes: &[Size]) -> super::Done {
+        let wanted = self.scene.as_deref().unwrap_or_default();
+        say!("| scene | tets | unknowns | set-up s | ms a step | solves | factorisations | skin off by mm |");
+        say!("| --- | --- | --- | --- | --- | --- | --- | --- |");
+        for scene in SCENES.iter().filter(|s| s.name.contains(wanted)) {
+            for size in sizes {
+                let s = steps(scene, size, !self.unchecked && size.name != "200k")?;
+                let off = s.error.map_or("-".into(), |e| format!("{:.1e}", 1e3 * e));
+                say!(
+                    "| {} | {} | {} | {:.2} | {:.3} | {:.1} | {} | {off} |",
+                    scene.name,
+                    s.n_tets,
+                    s.n_dofs,
+                    s.setup,
+                    1e3 * s.step,
+                    s.solves,
+                    s.factorisations
+                );
+            }
+        }
+        say!("");
+        for scene in SCENES.iter().filter(|s| s.name.contains(wanted)) {
+            say!("- `{}`: {}", scene.name, scene.what);
+        }
+        Ok(())
+    }
+}
+
+fn table_of_parts(sizes: &[Size]) -> super::Done {
+    say!(
+        "| tets | unknowns | forces ns/tet | stiffness ns/tet | analysis ms | factor ms | entries | solve ms | of the bandwidth | in double ms |"
+    );
+    say!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for size in sizes {
+        let p = parts(size, LAW)?;
+        let ns = 1e9 / p.n_tets as f64;
+        say!(
+            "| {} | {} | {:.1} | {:.1} | {:.1} | {:.1} | {:.2e} | {:.3} | {:.0} % of {:.0} GB/s | {:.3} |",
+            p.n_tets,
+            p.n_dofs,
+            ns * p.forces,
+            ns * p.stiffness,
+            1e3 * p.analysis,
+            1e3 * p.factor,
+            p.n_factor as f64,
+            1e3 * p.solve,
+            100.0 * p.solve_limit() / p.solve,
+            1e-9 * p.bandwidth,
+            1e3 * p.solve_double
+        );
+    }
+    say!("");
+    Ok(())
+}
