@@ -10,10 +10,12 @@
 mod description;
 mod documentation;
 mod package;
+mod platform;
 
 pub use description::{description, terminals};
 pub use documentation::documentation;
-pub use package::{PackageError, package, platform};
+pub use package::{Binary, PackageError, package};
+pub use platform::{Platform, UnknownPlatform};
 
 use crate::port::{Port, Slot};
 
