@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use fuzz::TARGETS;
 
-/// Changed inputs a target, as far as they fit into the time.
+/// Changed inputs a target, as far as they fit into the time. `CUTIS_FUZZ_SECONDS=600` goes on for ten minutes instead.
 const CHANGES: u64 = 400;
 const TIME: Duration = Duration::from_secs(4);
 
@@ -25,10 +25,12 @@ fn replay(name: &str) {
         println!("{}", path.display());
         once(&std::fs::read(path).unwrap());
     }
+    let asked = std::env::var("CUTIS_FUZZ_SECONDS").ok().and_then(|s| s.parse().ok());
+    let (time, most) = asked.map_or((TIME, CHANGES), |s| (Duration::from_secs(s), u64::MAX));
     let begin = Instant::now();
     let mut n = 0;
-    for k in 0..CHANGES {
-        if begin.elapsed() > TIME {
+    for k in 0..most {
+        if begin.elapsed() > time {
             break;
         }
         let seed = seeds[k as usize % seeds.len()].clone();
