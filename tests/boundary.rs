@@ -11,6 +11,7 @@ mod boundary {
     mod description;
     mod header;
     mod importer;
+    mod instructions;
     mod layers;
     mod symbols;
     mod util;

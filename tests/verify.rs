@@ -1,6 +1,8 @@
 //! Is the mathematics right: derivatives, invariants, patch tests, closed forms, well-posedness.
 #![allow(non_snake_case)]
 
+#[path = "verify/bench.rs"]
+mod bench;
 #[path = "verify/common.rs"]
 mod common;
 #[path = "verify/compare.rs"]
@@ -15,6 +17,8 @@ mod golden;
 mod head;
 #[path = "verify/invariants.rs"]
 mod invariants;
+#[path = "verify/iterative.rs"]
+mod iterative;
 #[path = "verify/linear_map.rs"]
 mod linear_map;
 #[path = "verify/loads.rs"]
@@ -33,6 +37,8 @@ mod scenes;
 mod sensitivity;
 #[path = "verify/sphere.rs"]
 mod sphere;
+#[path = "verify/study.rs"]
+mod study;
 #[path = "verify/time.rs"]
 mod time;
 #[path = "verify/tissue.rs"]

@@ -7,7 +7,7 @@ use crate::load;
 use crate::math::{Pose, Vec3};
 
 use crate::sim::SimError;
-use crate::solve::{Cholesky, LinearSolver, Precision, Problem};
+use crate::solve::{Cholesky, LinearSolver, MOST_ENTRIES, Precision, Problem};
 
 /// Seconds that the measurement of a part takes.
 const LONG_ENOUGH: f64 = 0.3;
@@ -69,7 +69,8 @@ pub fn parts(size: &Size, law: &str) -> Result<Parts, Error> {
     let stiffness = median_time(LONG_ENOUGH, || problem.assemble(&mut assembly, &config, &nodal, Curvature::Exact));
     problem.assemble(&mut assembly, &config, &nodal, Curvature::Projected);
     let mut analysed = None;
-    let analysis = median_time(0.0, || analysed = Some(Cholesky::analyse(&assembly.K.pattern, Precision::Single)));
+    let analysis =
+        median_time(0.0, || analysed = Some(Cholesky::analyse(&assembly.K.pattern, Precision::Single, MOST_ENTRIES)));
     let mut cholesky = analysed.expect("ran at least once").map_err(SimError::from)?;
     let mut found = Ok(());
     let factor = median_time(LONG_ENOUGH, || found = cholesky.factor(&assembly.K));

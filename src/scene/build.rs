@@ -12,7 +12,7 @@ use crate::fem::{Curving, Embedding, add_midsides, curve_midsides};
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::Slot;
 use crate::sim::{self, Drive, Layout, Marker, Model, ModelParts, Scheme};
-use crate::solve::{Precision, Strategy};
+use crate::solve::{LinearSystems, Precision, Strategy};
 
 /// Pairs that the quasi-Newton method remembers.
 const MEMORY: usize = 8;
@@ -190,7 +190,13 @@ impl Builder<'_> {
         let inversion = spec.map(|s| self.text.choice("solver", "inversion", &s.inversion)).transpose()?.flatten();
         let precision = spec.map(|s| self.text.choice("solver", "precision", &s.precision)).transpose()?.flatten();
         let single = precision.map_or(!newton, |p| p == "single");
+        let linear = spec.map(|s| self.text.choice("solver", "linear", &s.linear)).transpose()?.flatten();
         let strategy = Strategy {
+            linear: match linear {
+                Some("direct") => LinearSystems::Direct,
+                Some("iterative") => LinearSystems::Iterative,
+                _ => LinearSystems::Fitting,
+            },
             precision: if single { Precision::Single } else { Precision::Double },
             memory: if newton { 0 } else { MEMORY },
             refresh_after: if newton { 1 } else { REFRESH_AFTER },

@@ -12,7 +12,7 @@ use crate::effect::Elements;
 use crate::fem::{At, Configuration, Dofs, Material, Term};
 use crate::math::{Mat3, Mat9, Pose, Vec3};
 use crate::mesh::{TetMesh, signed_volume};
-use crate::solve::{Minimiser, Precision, Problem, SolveError, Strategy};
+use crate::solve::{LinearSystems, Minimiser, Precision, Problem, SolveError, Strategy};
 
 /// Depth at the corners of the mesh.
 pub(super) struct Depth(Vec<f64>);
@@ -89,6 +89,7 @@ fn solve(mesh: &TetMesh, n: usize, skin: &[u32], bones: &BTreeSet<u32>) -> Resul
         refresh_after: 2,
         tolerance: 1e-6,
         max_iterations: 20,
+        linear: LinearSystems::Fitting,
         precision: Precision::Double,
         without: None,
     };

@@ -303,6 +303,7 @@ pub struct SolverSpec {
     pub max_iterations: Option<Spanned<u32>>,
     pub inversion: Option<Spanned<String>>,
     pub precision: Option<Spanned<String>>,
+    pub linear: Option<Spanned<String>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

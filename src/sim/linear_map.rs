@@ -22,8 +22,8 @@ use crate::math::{Mat3, Pose, Vec3};
 use crate::port::Slot;
 use crate::solve::{Minimiser, Problem};
 
-/// A table takes no more numbers than the factor, or than this.
-const SMALL: usize = 1_000_000;
+/// A table takes no more bytes than matrices and factor, or than this.
+const SMALL: usize = 8_000_000;
 
 /// What a column is the answer to.
 #[derive(Debug, Clone, Copy)]
@@ -198,7 +198,7 @@ impl Builder<'_> {
 
 impl LinearMap {
     /// The table of a scene under the given inputs, with the linear solves it took; `None` for scenes that are not linear
-    /// in their inputs, or where a table would be larger than the factor.
+    /// in their inputs, or where a table would be larger than matrices and factor.
     ///
     /// # Errors
     /// As for [`Minimiser::linearise`].
@@ -212,7 +212,8 @@ impl LinearMap {
         };
         let parts = model.parts();
         let X = &parts.mesh.nodes;
-        if 3 * X.len() * (causes.len() + 1) > minimiser.factor_len().max(SMALL) {
+        let table = 3 * X.len() * (causes.len() + 1) * size_of::<f64>();
+        if table > minimiser.memory().max(SMALL) {
             return Ok(None);
         }
         let mut is_cause = vec![false; inputs.len()];

@@ -10,7 +10,7 @@
 use super::model::Model;
 use crate::fem::{At, Configuration};
 use crate::math::Vec3;
-use crate::solve::{Minimiser, Outcome, Precision, Problem, SolveError, Strategy};
+use crate::solve::{LinearSystems, Minimiser, Outcome, Precision, Problem, SolveError, Strategy};
 
 /// The stand-in only has to untangle, so it is solved coarsely: share of the model's size that the last correction may be.
 const COARSE: f64 = 1e-4;
@@ -20,6 +20,7 @@ const STRATEGY: Strategy = Strategy {
     refresh_after: 10,
     tolerance: 0.0,
     max_iterations: 500,
+    linear: LinearSystems::Fitting,
     precision: Precision::Double,
     without: None,
 };

@@ -35,8 +35,8 @@ impl Cholesky {
     /// Orders and analyses the pattern, and allocates everything later calls need.
     ///
     /// # Errors
-    /// [`SolveError::TooLarge`] for a factor beyond [`MOST_ENTRIES`].
-    pub fn analyse(pattern: &Pattern, precision: Precision) -> Result<Cholesky, SolveError> {
+    /// [`SolveError::TooLarge`] for a factor of more entries than `limit`.
+    pub fn analyse(pattern: &Pattern, precision: Precision, limit: usize) -> Result<Cholesky, SolveError> {
         let n = 3 * pattern.n();
         let scalar = scalar_pattern(pattern);
         let order = nested_dissection(pattern).map(|blocks| {
@@ -51,14 +51,14 @@ impl Cholesky {
             Some((forward, inverse)) => SymmetricOrdering::Custom(PermRef::new_checked(forward, inverse, n)),
             None => SymmetricOrdering::Amd,
         };
-        let too_large = |entries: usize| SolveError::TooLarge { unknowns: n, entries, limit: MOST_ENTRIES };
+        let too_large = |entries: usize| SolveError::TooLarge { unknowns: n, entries, limit };
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
         let symbolic = factorize_symbolic_cholesky(scalar.as_ref(), Side::Lower, ordering, params)
             .map_err(|_| too_large(u32::MAX as usize))?;
-        if symbolic.len_val() > MOST_ENTRIES {
+        if symbolic.len_val() > limit {
             return Err(too_large(symbolic.len_val()));
         }
         let scratch = StackReq::or(
@@ -78,17 +78,6 @@ impl Cholesky {
             scalar,
             symbolic,
         })
-    }
-
-    /// Bytes of the factor in both precisions and of the matrix that it is made from.
-    pub fn memory(&self) -> usize {
-        let scalar = self.values.len() * (size_of::<f64>() + size_of::<u32>());
-        size_of_val(&self.factor[..]) + scalar + self.panels.as_ref().map_or(0, Panels::memory)
-    }
-
-    /// Stored entries of the factor.
-    pub fn factor_len(&self) -> usize {
-        self.factor.len()
     }
 }
 
@@ -147,6 +136,15 @@ impl LinearSolver for Cholesky {
         for (to, from) in b.iter_mut().zip(self.rhs.chunks_exact(3)) {
             to.copy_from_slice(from);
         }
+    }
+
+    fn memory(&self) -> usize {
+        let scalar = self.values.len() * (size_of::<f64>() + size_of::<u32>());
+        size_of_val(&self.factor[..]) + scalar + self.panels.as_ref().map_or(0, Panels::memory)
+    }
+
+    fn factor_len(&self) -> usize {
+        self.factor.len()
     }
 }
 
@@ -211,7 +209,7 @@ mod tests {
         let x: Vec<Vec3> = (0..n).map(|i| Vec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
         let mut b = vec![Vec3::zeros(); n];
         A.multiply(&x, &mut b);
-        let mut solver = Cholesky::analyse(&A.pattern, Precision::Double).expect("a small system");
+        let mut solver = Cholesky::analyse(&A.pattern, Precision::Double, MOST_ENTRIES).expect("a small system");
         solver.factor(&A).expect("diagonally dominant");
         solver.solve(&mut b);
         assert!(x.iter().zip(&b).all(|(x, b)| (x - b).norm() < 1e-10));
@@ -226,7 +224,7 @@ mod tests {
             let x: Vec<Vec3> = (0..n).map(|i| scale * Vec3::new((i as f64).sin(), 1.0, -0.5)).collect();
             let mut b = vec![Vec3::zeros(); n];
             A.multiply(&x, &mut b);
-            let mut solver = Cholesky::analyse(&A.pattern, Precision::Single).expect("a small system");
+            let mut solver = Cholesky::analyse(&A.pattern, Precision::Single, MOST_ENTRIES).expect("a small system");
             solver.factor(&A).expect("diagonally dominant");
             let mut again = b.clone();
             solver.solve(&mut again);

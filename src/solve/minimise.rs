@@ -7,8 +7,9 @@
 //! 36(3), 2017; line search after Nocedal & Wright, "Numerical Optimization", 2nd ed., 2006, sections 3.1 and 3.5, with
 //! the approximate condition of Hager & Zhang, SIAM J. Optim. 16(1), 2005, where energy differences drown in round-off.
 
+use super::choice::choose;
 use super::lbfgs::{Lbfgs, dot};
-use super::{Cholesky, LinearSolver, Precision, Problem, Rung, SolveError};
+use super::{LinearSolver, LinearSystems, Precision, Problem, Rung, SolveError};
 use crate::fem::{Assembly, Configuration, Curvature};
 use crate::math::{Mat3, Vec3};
 
@@ -23,6 +24,8 @@ pub struct Strategy {
     pub tolerance: f64,
     /// Most linear solves in one minimisation.
     pub max_iterations: u32,
+    /// How linear systems are solved.
+    pub linear: LinearSystems,
     /// Precision of the linear solves.
     pub precision: Precision,
     /// A rung that is left out, to be measured.
@@ -61,7 +64,7 @@ const SHORTENED_AGES: u32 = 4;
 /// The linear algebra of one model: pattern, factor and buffers. Allocates only when made.
 pub struct Minimiser {
     assembly: Assembly,
-    cholesky: Cholesky,
+    solver: Box<dyn LinearSolver>,
     memory: Lbfgs,
     strategy: Strategy,
     /// Rotation from the configuration that was factored to the one at hand.
@@ -83,13 +86,18 @@ impl Minimiser {
     ///
     /// # Errors
     /// [`SolveError::TooLarge`].
-    pub fn new(problem: &Problem, strategy: Strategy) -> Result<Minimiser, SolveError> {
+    pub fn new(problem: &Problem, mut strategy: Strategy) -> Result<Minimiser, SolveError> {
         let assembly = Assembly::new(problem.terms, problem.dofs);
+        let solver = choose(&assembly.K.pattern, strategy.precision, strategy.linear)?;
+        if solver.factor_len() == 0 {
+            // A solve by iteration costs about as much with a new matrix as with an old one: Newton's method.
+            (strategy.memory, strategy.refresh_after) = (0, 1);
+        }
         let n = problem.dofs.n_blocks();
         let config =
             Configuration { x: problem.X.to_vec(), poses: vec![crate::math::Pose::REST; problem.pivots.len()] };
         Ok(Minimiser {
-            cholesky: Cholesky::analyse(&assembly.K.pattern, strategy.precision)?,
+            solver,
             assembly,
             memory: Lbfgs::new(strategy.memory, n),
             strategy,
@@ -112,13 +120,13 @@ impl Minimiser {
 
     /// Stored entries of the factor.
     pub fn factor_len(&self) -> usize {
-        self.cholesky.factor_len()
+        self.solver.factor_len()
     }
 
     /// Bytes of the matrices, the factor and the vectors.
     pub fn memory(&self) -> usize {
         let vectors = 2 * self.nodal.len() * 2 + self.g.len() * (3 + 2 * self.strategy.memory);
-        self.assembly.memory() + self.cholesky.memory() + vectors * size_of::<Vec3>()
+        self.assembly.memory() + self.solver.memory() + vectors * size_of::<Vec3>()
     }
 
     /// Whether a factor is at hand.
@@ -153,7 +161,7 @@ impl Minimiser {
         self.memory.forget();
         for curvature in [Curvature::Exact, Curvature::Projected] {
             problem.assemble(&mut self.assembly, config, &self.nodal, curvature);
-            match self.cholesky.factor(&self.assembly.K) {
+            match self.solver.factor(&self.assembly.K) {
                 Ok(()) => {
                     self.factored = true;
                     return Ok(());
@@ -175,13 +183,13 @@ impl Minimiser {
 
     /// `d <- K^-1 d` with the factor at hand, in double precision.
     pub fn apply_inverse(&mut self, d: &mut [Vec3]) {
-        self.cholesky.solve_in_double(d);
+        self.solver.solve_in_double(d);
     }
 
     /// Moves `config` to where the factor at hand expects the equilibrium once the prescribed nodes have gone by `u`:
     /// `K d = -(g + K_p u)`. The prescribed nodes of `config` are moved, too.
     pub fn predict(&mut self, problem: &Problem, config: &mut Configuration, u: &[Vec3]) {
-        let Minimiser { assembly, cholesky, strategy, frame, lag, nodal, g, d, trial, .. } = self;
+        let Minimiser { assembly, solver, strategy, frame, lag, nodal, g, d, trial, .. } = self;
         lag.copy_from(config);
         problem.gradient(config, lag, nodal, g);
         d.fill(Vec3::zeros());
@@ -189,7 +197,7 @@ impl Minimiser {
         for (d, g) in d.iter_mut().zip(&*g) {
             *d = -(*d + frame.tr_mul(g));
         }
-        cholesky.solve(d);
+        solver.solve(d);
         turn(frame, d);
         if !strategy.has(Rung::Predictor) {
             d.fill(Vec3::zeros());
@@ -292,11 +300,11 @@ impl Minimiser {
 
     /// `d = -H g`; returns the slope `g.d`.
     fn direction(&mut self) -> f64 {
-        let Minimiser { cholesky, memory, frame, g, d, .. } = self;
+        let Minimiser { solver, memory, frame, g, d, .. } = self;
         d.copy_from_slice(g);
         memory.apply(d, |q| {
             turn(&frame.transpose(), q);
-            cholesky.solve(q);
+            solver.solve(q);
             turn(frame, q);
         });
         for d in d.iter_mut() {

@@ -1,8 +1,11 @@
-//! Minimisation of a sum of terms over the unknowns: sparse Cholesky, quasi-Newton and Newton steps, line search.
+//! Minimisation of a sum of terms over the unknowns: sparse Cholesky or conjugate gradients, quasi-Newton and Newton steps, line search.
 #![forbid(unsafe_code)]
 #![allow(non_snake_case)]
 
+mod choice;
 mod cholesky;
+mod gradients;
+mod incomplete;
 mod lbfgs;
 mod minimise;
 mod ordering;
@@ -10,7 +13,8 @@ mod panels;
 mod problem;
 mod rung;
 
-pub use cholesky::Cholesky;
+pub use cholesky::{Cholesky, MOST_ENTRIES};
+pub use gradients::Gradients;
 pub use minimise::{Minimiser, Outcome, Strategy};
 pub use ordering::nested_dissection;
 pub use problem::Problem;
@@ -52,7 +56,7 @@ pub enum SolveError {
     NotFinite,
     /// The factor would not fit a common machine's memory.
     #[error(
-        "the factor of {unknowns} unknowns would hold {entries} numbers of 8 bytes or more, the limit is {limit}: use a coarser mesh"
+        "the factor of {unknowns} unknowns would hold {entries} numbers of 8 bytes or more, the limit is {limit}: use a coarser mesh, or [solver] linear = \"iterative\""
     )]
     TooLarge {
         /// Scalar unknowns.
@@ -91,8 +95,19 @@ pub enum Precision {
     Double,
 }
 
+/// How linear systems are solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LinearSystems {
+    /// By a factor where that fits a common machine's memory, else by conjugate gradients.
+    Fitting,
+    /// By a factor.
+    Direct,
+    /// By conjugate gradients: memory in proportion to the mesh.
+    Iterative,
+}
+
 /// A solver for symmetric positive definite systems of 3x3 blocks.
-pub trait LinearSolver {
+pub trait LinearSolver: Send {
     /// Takes new numbers on the known pattern.
     ///
     /// # Errors
@@ -104,4 +119,10 @@ pub trait LinearSolver {
 
     /// The same, always in double precision.
     fn solve_in_double(&mut self, b: &mut [crate::math::Vec3]);
+
+    /// Bytes of matrices and factors.
+    fn memory(&self) -> usize;
+
+    /// Stored entries of the factor; 0 where there is none, and solves are by iteration.
+    fn factor_len(&self) -> usize;
 }

@@ -15,7 +15,7 @@ use cutis::fem::{At, Configuration, Curvature, Dofs, EDGES, Elastic, HessianSink
 use cutis::geometry::{Block, Pattern, block};
 use cutis::math::{Mat3, Vec3, vec9};
 use cutis::mesh::TetMesh;
-use cutis::solve::{Minimiser, Precision, Problem, Strategy};
+use cutis::solve::{LinearSystems, Minimiser, Precision, Problem, Strategy};
 
 /// A measured rate may lie this far below the theory's on these meshes, which are not yet fine.
 const SLACK: f64 = 0.1;
@@ -154,6 +154,7 @@ fn errors<M: Energy + 'static>(law: fn() -> M, force: f64, order: u32, n: usize)
         refresh_after: 1,
         tolerance: 1e-10,
         max_iterations: 50,
+        linear: LinearSystems::Direct,
         precision: Precision::Double,
         without: None,
     };

@@ -320,6 +320,23 @@ fn presets_are_tissues_with_sources() {
 }
 
 #[test]
+fn stiffness_from_the_softest_to_the_stiffest_row_changes_no_digit() {
+    let shape = |E: f64| {
+        let tissue = format!("E = {E:e}\nnu = 0.45\n");
+        let text = layer("", "").replace("E = 10e3\nnu = 0.0\nenergy = \"linear\"\n", &tissue);
+        let mut sim = sim(&format!("{text}[[pressure]]\nname = \"p\"\npressure = {:e}\n", 0.05 * E));
+        sim.initialise().unwrap_or_else(|e| panic!("{E:e} Pa: {e}"));
+        displacement(&sim)
+    };
+    let [soft, middle, stiff] = [0.21e6, 20.7e9, 1.17e12].map(shape);
+    let size = soft.iter().map(|u| u.norm()).fold(0.0, f64::max);
+    for other in [middle, stiff] {
+        let off = soft.iter().zip(&other).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(off < 1e-6 * size, "{off:e} of {size:e} m");
+    }
+}
+
+#[test]
 fn slips_in_tissue_tables_are_answered() {
     let refused = |tissue: &str| match cutis::load::from_text(&layer(tissue, ""), None) {
         Ok(_) => panic!("accepted: {tissue}"),
