@@ -4,7 +4,8 @@
  *       bone |================| bone --> 5 mm
  *            |________________|             cross-section 2 cm x 2 cm, E = 15 kPa
  *
- *  cc -std=c99 -Iinclude examples/drive_from_c.c -o strip -Ltarget/release -lcutis -Wl,-rpath,target/release && ./strip
+ *  ./install --prefix ~/.local && export PKG_CONFIG_PATH=~/.local/lib/pkgconfig LD_LIBRARY_PATH=~/.local/lib
+ *  cc -std=c99 examples/drive_from_c.c -o strip $(pkg-config --cflags --libs cutis) -lm && ./strip
  *
  *  Number to expect: about 0.31 N of pull; E A strain = 0.30 N, and a little more because the bones hold the ends wide.
  */

@@ -4,8 +4,8 @@
 //       rest --save---+
 //                     +--> jaw 1 mm up    --> skin B        and down again: skin A, bit for bit
 //
-//  c++ -std=c++11 -Iinclude examples/drive_from_cpp.cpp -o futures -Ltarget/release -lcutis -Wl,-rpath,target/release &&
-//  ./futures
+//  ./install --prefix ~/.local && export PKG_CONFIG_PATH=~/.local/lib/pkgconfig LD_LIBRARY_PATH=~/.local/lib
+//  c++ -std=c++11 examples/drive_from_cpp.cpp -o futures $(pkg-config --cflags --libs cutis) && ./futures
 //
 //  Number to expect: 1.04 mm between skin A and rest, 2.09 mm between A and B, 0 mm between A and A again.
 #include <algorithm>

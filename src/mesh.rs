@@ -115,6 +115,9 @@ pub enum MeshError {
     },
 }
 
+/// Volumes below this share of the cube of the longest edge are rounding: such an element has no inverse.
+const FLAT: f64 = 1e-15;
+
 /// Signed volume of a tetrahedron, m3; positive where the corners turn right-handed.
 pub fn signed_volume(x: [Vec3; 4]) -> f64 {
     (x[1] - x[0]).cross(&(x[2] - x[0])).dot(&(x[3] - x[0])) / 6.0
@@ -218,12 +221,20 @@ impl TetMesh {
         }
         unique("node", self.node_sets.iter().map(|s| &s.name))?;
         unique("face", self.face_sets.iter().map(|s| &s.name))?;
-        let inverted = |e: &usize| self.volume(*e) <= 0.0;
+        let inverted = |e: &usize| !self.has_room(*e);
         if let Some(tet) = (0..self.tets.len()).find(inverted) {
             let count = (0..self.tets.len()).filter(inverted).count();
             return Err(MeshError::Inverted { tet, volume: self.volume(tet), count });
         }
         Ok(self)
+    }
+
+    /// Whether tetrahedron `e` is neither inside out nor flat to rounding, and its volume is a number.
+    fn has_room(&self, e: usize) -> bool {
+        let x = self.tets[e].map(|a| self.nodes[a as usize]);
+        let longest = (1..4).map(|a| (x[a] - x[0]).norm()).fold(0.0, f64::max);
+        let volume = signed_volume(x);
+        volume.is_normal() && volume > FLAT * longest.powi(3)
     }
 
     /// Signed rest volume of tetrahedron `e`, m3.

@@ -29,7 +29,7 @@ impl Demo {
         stage("meshing the head", 0);
         let (_, report) = Head::default().mesh()?;
         stage("packing the components", 20);
-        let archives = fmu::write(None, None, &self.out, false)?;
+        let archives = fmu::write(None, fmu::own_binary(None)?, &self.out, false)?;
         stage("unpacking, instantiating", 60);
         let before = Instant::now();
         let mut host = Host::open(&archives[0].0)?;

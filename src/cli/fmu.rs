@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use cutis::fmu::{FmiVersion, package};
+use cutis::fmu::{Binary, FmiVersion, Platform, package};
 use cutis::{io, load};
 
 #[derive(clap::Args)]
@@ -16,23 +16,46 @@ pub struct Fmu {
     #[arg(short, long, default_value = "out")]
     out: PathBuf,
     /// Shared library to pack; found beside this program if left out
-    #[arg(long)]
+    #[arg(long, conflicts_with = "binary")]
     library: Option<PathBuf>,
+    /// Shared library of a platform to pack, for example x86_64-windows=cutis.dll; once for each, instead of --library
+    #[arg(long, value_name = "PLATFORM=PATH", value_parser = platform_and_path)]
+    binary: Vec<(Platform, PathBuf)>,
+}
+
+fn platform_and_path(text: &str) -> Result<(Platform, PathBuf), String> {
+    let (platform, path) = text.split_once('=').ok_or("wanted PLATFORM=PATH, for example x86_64-windows=cutis.dll")?;
+    Ok((platform.parse().map_err(|why: cutis::fmu::UnknownPlatform| why.to_string())?, path.into()))
 }
 
 impl Fmu {
     pub fn run(self) -> super::Done {
-        for (path, bytes) in write(self.scene.as_deref(), self.library.as_deref(), &self.out, self.full)? {
+        for (path, bytes) in write(self.scene.as_deref(), self.binaries()?, &self.out, self.full)? {
             say!("wrote {} ({:.2} MB)", path.display(), bytes as f64 / 1e6);
         }
         Ok(())
     }
+
+    fn binaries(&self) -> Result<Vec<Binary>, Box<dyn std::error::Error>> {
+        if self.binary.is_empty() {
+            return own_binary(self.library.as_deref());
+        }
+        let read =
+            |(platform, path): &(Platform, PathBuf)| Ok(Binary { platform: *platform, bytes: io::read_bytes(path)? });
+        self.binary.iter().map(read).collect()
+    }
+}
+
+/// The library for this machine: `library`, or the one beside this program.
+pub fn own_binary(library: Option<&Path>) -> Result<Vec<Binary>, Box<dyn std::error::Error>> {
+    let path = library.map_or_else(find_library, |l| Ok(l.to_path_buf()))?;
+    Ok(vec![Binary { platform: Platform::here()?, bytes: io::read_bytes(&path)? }])
 }
 
 /// Writes both archives, or all three, into `out`; returns their paths and sizes.
 pub fn write(
     scene: Option<&Path>,
-    library: Option<&Path>,
+    binaries: Vec<Binary>,
     out: &Path,
     full: bool,
 ) -> Result<Vec<(PathBuf, usize)>, Box<dyn std::error::Error>> {
@@ -41,11 +64,10 @@ pub fn write(
         None => load::baked_default()?,
     };
     let loaded = baked.load()?;
-    let binary = io::read_bytes(&library.map_or_else(find_library, |l| Ok(l.to_path_buf()))?)?;
     io::create_folder(out)?;
     let mut written = Vec::new();
     for version in [FmiVersion::V3, FmiVersion::V2, FmiVersion::V2Full].into_iter().take(if full { 3 } else { 2 }) {
-        let archive = package(&loaded, &baked, &binary, version)?;
+        let archive = package(&loaded, &baked, &binaries, version)?;
         let path = out.join(version.archive_name());
         io::write_bytes(&path, &archive)?;
         written.push((path, archive.len()));

@@ -76,12 +76,17 @@ pub enum CutisCausality {
 ///
 /// Every function may be called from any thread, on one handle by one thread at a time; handles are independent.
 pub struct CutisSim {
-    #[expect(dead_code, reason = "reached through the pointer, by the guard")]
-    handle: Handle<Inner>,
+    // A `Handle<Inner>`, which callers and tools that compare interfaces need not see.
+    _opaque: [u8; 0],
 }
 
 /// A saved state of a simulation; it is never changed, so any number of threads may restore from it.
 pub struct CutisState {
+    // A `Saved`.
+    _opaque: [u8; 0],
+}
+
+struct Saved {
     tag: u64,
     state: State,
 }
@@ -133,7 +138,7 @@ unsafe fn with(sim: *mut CutisSim, body: impl FnOnce(&mut Inner) -> Result<(), F
             }
         }
     };
-    // SAFETY: a CutisSim is its handle and nothing else; the rest is the caller's promise.
+    // SAFETY: behind a CutisSim pointer is a handle; the rest is the caller's promise.
     match unsafe { guard::with(sim.cast::<Handle<Inner>>(), guarded) } {
         Ok(status) => status,
         Err(Denied::Null | Denied::Foreign) => CutisStatus::CUTIS_NULL,
@@ -776,7 +781,7 @@ pub unsafe extern "C" fn cutis_sim_reset(sim: *mut CutisSim) -> CutisStatus {
 pub unsafe extern "C" fn cutis_sim_save(sim: *const CutisSim) -> *mut CutisState {
     let mut saved = std::ptr::null_mut();
     let body = |inner: &mut Inner| {
-        saved = Box::into_raw(Box::new(CutisState { tag: STATE_TAG, state: inner.sim.save() }));
+        saved = leak(inner.sim.save());
         Ok(())
     };
     // SAFETY: the caller's promise.
@@ -784,13 +789,18 @@ pub unsafe extern "C" fn cutis_sim_save(sim: *const CutisSim) -> *mut CutisState
     saved
 }
 
+/// Moves `state` to the heap and gives away its address; cutis_state_free takes it back.
+fn leak(state: State) -> *mut CutisState {
+    Box::into_raw(Box::new(Saved { tag: STATE_TAG, state })).cast()
+}
+
 /// The state behind a pointer.
 ///
 /// # Safety
 /// `state` is null or came from `cutis_sim_save` or `cutis_state_deserialize` and was not freed.
-unsafe fn state_at<'a>(state: *const CutisState) -> Result<&'a CutisState, Failure> {
+unsafe fn state_at<'a>(state: *const CutisState) -> Result<&'a Saved, Failure> {
     // SAFETY: the caller's promise; the tag is read before anything else.
-    match unsafe { state.as_ref() } {
+    match unsafe { state.cast::<Saved>().as_ref() } {
         Some(state) if state.tag == STATE_TAG => Ok(state),
         _ => Err(Failure(CutisStatus::CUTIS_NULL, "the state is NULL, or no state".to_owned())),
     }
@@ -822,7 +832,7 @@ pub unsafe extern "C" fn cutis_state_free(state: *mut CutisState) {
     // SAFETY: the caller's promise.
     if unsafe { state_at(state) }.is_ok() {
         // SAFETY: not null and ours, so it came from `Box::into_raw`.
-        let mut owned = unsafe { Box::from_raw(state) };
+        let mut owned = unsafe { Box::from_raw(state.cast::<Saved>()) };
         owned.tag = 0;
         let _ = guard::caught(move || drop(owned));
     }
@@ -892,7 +902,7 @@ pub unsafe extern "C" fn cutis_state_deserialize(
         let (bytes, state) = unsafe { (pointer::slice(bytes, len, "bytes")?, place(state, "state")?) };
         let read = State::from_bytes(bytes, inner.sim.model())
             .map_err(|why| Failure(CutisStatus::CUTIS_STATE, chain(&why)))?;
-        *state = Box::into_raw(Box::new(CutisState { tag: STATE_TAG, state: read }));
+        *state = leak(read);
         Ok(())
     };
     // SAFETY: the caller's promise.

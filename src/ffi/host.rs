@@ -17,7 +17,7 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::logger::Status;
-use crate::fmu::{FmiVersion, MODEL_IDENTIFIER, platform};
+use crate::fmu::{FmiVersion, Platform, UnknownPlatform};
 
 /// Why an archive could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +46,9 @@ pub enum HostError {
         /// What the loader says.
         why: String,
     },
+    /// The standard has no name for this machine.
+    #[error(transparent)]
+    Platform(#[from] UnknownPlatform),
     /// There is no such variable.
     #[error("the archive has no {ty} variable named `{name}`")]
     NoVariable {
@@ -132,9 +135,7 @@ impl Host {
         let folder = Folder::new()?;
         unpack(archive, &folder.0)?;
         let (token, variables) = read_description(&folder.0.join("modelDescription.xml"))?;
-        let library =
-            format!("binaries/{}/{MODEL_IDENTIFIER}{}", platform(FmiVersion::V3), std::env::consts::DLL_SUFFIX);
-        let library = Library::open(&folder.0.join(library))?;
+        let library = Library::open(&folder.0.join(Platform::here()?.library(FmiVersion::V3)))?;
         // SAFETY: the types are those of fmi3FunctionTypes.h for these names.
         let (instantiate, functions) = unsafe {
             let instantiate: Instantiate = std::mem::transmute(library.symbol(c"fmi3InstantiateCoSimulation")?);

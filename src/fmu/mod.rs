@@ -13,11 +13,13 @@ mod documentation;
 mod licenses;
 mod package;
 mod picture;
+mod platform;
 mod reference;
 
 pub use description::{description, terminals};
 pub use documentation::documentation;
-pub use package::{PackageError, package, platform};
+pub use package::{Binary, PackageError, package};
+pub use platform::{Platform, UnknownPlatform};
 
 use crate::port::{Port, Slot};
 

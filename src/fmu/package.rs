@@ -9,17 +9,25 @@ use std::sync::Arc;
 
 use super::picture::picture;
 use super::reference::{self, FOLDER};
-use super::{FmiVersion, MODEL_IDENTIFIER, description, documentation, licenses, terminals};
+use super::{FmiVersion, Platform, description, documentation, licenses, terminals};
 use crate::load::{Baked, Loaded};
 
 /// Why an archive was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum PackageError {
     /// There is nothing an importer could load.
-    #[error("the library for binaries/{folder} is empty")]
-    NoLibrary {
-        /// Platform folder.
-        folder: String,
+    #[error("there is no library to pack")]
+    NoLibrary,
+    /// Two libraries would have one place.
+    #[error("there are two libraries for {0}")]
+    Twice(Platform),
+    /// An importer there could not load it.
+    #[error("the library for {wanted} {}", found.map_or("is no shared library".to_owned(), |p| format!("is one for {p}")))]
+    Foreign {
+        /// What it was given for.
+        wanted: Platform,
+        /// What it is, as far as that can be told.
+        found: Option<Platform>,
     },
     /// The archive could not be put together.
     #[error("the archive could not be written")]
@@ -35,31 +43,31 @@ pub enum PackageError {
     Reference(#[from] crate::sim::SimError),
 }
 
-/// Folder of this platform's library inside an archive, for example `x86_64-linux` or, in FMI 2.0, `linux64`.
-pub fn platform(version: FmiVersion) -> String {
-    let os = if std::env::consts::OS == "macos" { "darwin" } else { std::env::consts::OS };
-    match (version, std::env::consts::ARCH, os) {
-        (FmiVersion::V2 | FmiVersion::V2Full, "x86_64", "linux") => "linux64".to_owned(),
-        (FmiVersion::V2 | FmiVersion::V2Full, "x86_64", "windows") => "win64".to_owned(),
-        (FmiVersion::V2 | FmiVersion::V2Full, "x86_64", "darwin") => "darwin64".to_owned(),
-        (_, arch, os) => format!("{arch}-{os}"),
-    }
+/// A shared library and the machines it runs on.
+pub struct Binary {
+    /// Where it runs.
+    pub platform: Platform,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
 }
 
-/// The archive of `scene`: `baked` goes into resources, `binary` is this platform's shared library.
+/// The archive of `scene`: `baked` goes into resources, `binaries` are the shared library for one or more platforms.
 ///
 /// # Errors
-/// [`PackageError::NoLibrary`] without a library, [`PackageError::Reference`] for a scene that cannot be run (FMI 3.0);
-/// others only where memory ends.
-pub fn package(scene: &Loaded, baked: &Baked, binary: &[u8], version: FmiVersion) -> Result<Vec<u8>, PackageError> {
-    let folder = platform(version);
-    if binary.is_empty() {
-        return Err(PackageError::NoLibrary { folder });
-    }
-    let library = format!("binaries/{folder}/{MODEL_IDENTIFIER}{}", std::env::consts::DLL_SUFFIX);
+/// [`PackageError::NoLibrary`], [`PackageError::Twice`], [`PackageError::Foreign`] by what is wrong with the libraries,
+/// [`PackageError::Reference`] for a scene that cannot be run (FMI 3.0); others only where memory ends.
+pub fn package(
+    scene: &Loaded,
+    baked: &Baked,
+    binaries: &[Binary],
+    version: FmiVersion,
+) -> Result<Vec<u8>, PackageError> {
+    check(binaries)?;
     let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::new())));
     archive.add("modelDescription.xml", 0o644, description(scene, version).as_bytes())?;
-    archive.add(&library, 0o755, binary)?;
+    for binary in binaries {
+        archive.add(&binary.platform.library(version), 0o755, &binary.bytes)?;
+    }
     let picture = picture(&scene.model);
     let page = documentation(&scene.model, version, picture.is_some());
     archive.add("documentation/index.html", 0o644, page.as_bytes())?;
@@ -84,6 +92,22 @@ pub fn package(scene: &Loaded, baked: &Baked, binary: &[u8], version: FmiVersion
         archive.add(&format!("{FOLDER}/cutis_out.csv"), 0o644, run.outputs.as_bytes())?;
     }
     Ok(archive.0.finish()?.into_inner())
+}
+
+fn check(binaries: &[Binary]) -> Result<(), PackageError> {
+    if binaries.is_empty() {
+        return Err(PackageError::NoLibrary);
+    }
+    for (k, Binary { platform, bytes }) in binaries.iter().enumerate() {
+        if binaries[..k].iter().any(|b| b.platform == *platform) {
+            return Err(PackageError::Twice(*platform));
+        }
+        let found = Platform::of_library(bytes);
+        if found != Some(*platform) {
+            return Err(PackageError::Foreign { wanted: *platform, found });
+        }
+    }
+    Ok(())
 }
 
 const LICENSE: &str = "This component is licensed under either of the MIT license (LICENSE-MIT) or the Apache license 2.0 (LICENSE-APACHE),

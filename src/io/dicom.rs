@@ -10,6 +10,7 @@ use dicom_object::{DefaultDicomObject, Tag};
 
 use super::IoError;
 use super::ct;
+use super::dicom_lengths::{Claim, lengths_fit};
 use crate::geometry::Volume;
 use crate::math::Vec3;
 
@@ -91,6 +92,10 @@ fn read_slice(path: &Path) -> Result<Slice, IoError> {
         let why = std::iter::successors(Some(e), |e| e.source()).last().map_or(String::new(), ToString::to_string);
         IoError::format(path, "the DICOM data set", why, "a whole DICOM file: copy it again")
     };
+    let bytes = std::fs::read(path).map_err(IoError::file(path))?;
+    lengths_fit(&bytes).map_err(|Claim { group, element, bytes, left }| {
+        IoError::truncated(path, format!("element ({group:04X},{element:04X})"), bytes.into(), left as u64)
+    })?;
     let object = dicom_object::open_file(path).map_err(|e| broken(&e))?;
     let modality = text(&object, MODALITY).unwrap_or_else(|| "unknown".into());
     if modality != "CT" {

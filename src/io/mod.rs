@@ -4,6 +4,7 @@
 mod baked;
 mod ct;
 mod dicom;
+mod dicom_lengths;
 mod error;
 mod file;
 mod gmsh;

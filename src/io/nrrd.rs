@@ -33,6 +33,11 @@ pub(super) fn read(path: &Path) -> Result<Volume, IoError> {
         }
         Some(name) => {
             let file = path.with_file_name(name);
+            // A header may name anything, also a device that never ends.
+            if !std::fs::metadata(&file).map_err(IoError::file(&file))?.is_file() {
+                let found = format!("a `data file` that is no file: {}", file.display());
+                return Err(IoError::unsupported(path, found, "name the file that holds the samples"));
+            }
             outside = std::fs::read(&file).map_err(IoError::file(&file))?;
             &outside[..]
         }

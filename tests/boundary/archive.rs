@@ -2,19 +2,24 @@
 
 use std::io::{Cursor, Read};
 
-use cutis::fmu::{FmiVersion, description, package, platform};
+use cutis::fmu::{Binary, FmiVersion, PackageError, Platform, description, package};
 
 use super::util::{library, root, scratch};
 
 /// Promised size of an archive.
 const LARGEST: usize = 20_000_000;
 
+/// The library for the machine that runs this test.
+fn binary() -> Binary {
+    Binary { platform: Platform::here().unwrap(), bytes: std::fs::read(library()).unwrap() }
+}
+
 /// The archive of the default scene, written where other tests find it.
 pub fn archive(version: FmiVersion, folder: &str) -> std::path::PathBuf {
     let scene = root().join("fmu/scene.toml");
     let loaded = cutis::load::from_file(&scene).unwrap();
     let baked = cutis::load::baked(&scene).unwrap();
-    let bytes = package(&loaded, &baked, &std::fs::read(library()).unwrap(), version).unwrap();
+    let bytes = package(&loaded, &baked, &[binary()], version).unwrap();
     let path = scratch(folder).join(version.archive_name());
     std::fs::write(&path, bytes).unwrap();
     path
@@ -62,7 +67,7 @@ fn archives_are_reproducible_small_and_complete() {
             assert_eq!(entry.compression(), zip::CompressionMethod::Deflated, "{:?}", entry.name());
             assert!(!entry.name().unwrap().contains('\\') && entry.enclosed_name().is_some());
         }
-        assert!(names.iter().any(|n| n.starts_with(&format!("binaries/{}/cutis", platform(version)))));
+        assert!(names.contains(&binary().platform.library(version)), "{version:?}: {names:?}");
     }
 }
 
@@ -169,4 +174,26 @@ fn the_token_is_a_hash_of_scene_interface_and_mesh() {
         assert!(tokens[..k].iter().all(|b| a != b), "{tokens:?}");
     }
     assert_eq!(tokens[0], scene("", "[3, 2, 1]", ""));
+}
+
+#[test]
+fn an_archive_takes_one_library_a_platform() {
+    let scene = root().join("fmu/scene.toml");
+    let (loaded, baked) = (cutis::load::from_file(&scene).unwrap(), cutis::load::baked(&scene).unwrap());
+    let pack = |binaries: &[Binary]| package(&loaded, &baked, binaries, FmiVersion::V3);
+    let other = |platform: &str, bytes: Vec<u8>| Binary { platform: platform.parse().unwrap(), bytes };
+    let mut windows = vec![0; 72];
+    windows[..2].copy_from_slice(b"MZ");
+    (windows[60], windows[68], windows[69]) = (64, 0x64, 0x86);
+    let both = pack(&[binary(), other("x86_64-windows", windows.clone())]).unwrap();
+    let zip = zip::ZipArchive::new(Cursor::new(both)).unwrap();
+    let names: Vec<String> = zip.file_names().map(|n| n.unwrap().to_string()).collect();
+    assert_eq!(names.iter().filter(|n| n.starts_with("binaries/")).count(), 2, "{names:?}");
+    assert!(names.iter().any(|n| n == "binaries/x86_64-windows/cutis.dll"), "{names:?}");
+
+    assert!(matches!(pack(&[]), Err(PackageError::NoLibrary)));
+    assert!(matches!(pack(&[binary(), binary()]), Err(PackageError::Twice(_))));
+    let message = pack(&[other("aarch64-darwin", windows)]).unwrap_err().to_string();
+    assert_eq!(message, "the library for aarch64-darwin is one for x86_64-windows");
+    assert!(matches!(pack(&[other("x86_64-linux", b"text".to_vec())]), Err(PackageError::Foreign { found: None, .. })));
 }

@@ -1,7 +1,8 @@
 //! C99 and C++11 programs against the header and the shared library; under valgrind where it is installed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 
 use super::util::{library, root, scratch};
 
@@ -35,10 +36,24 @@ name = "moved"
 nodes = "x_max"
 "#;
 
+/// A folder with the library under the name that the linker looks for, and the one that the loader does.
+fn linked() -> PathBuf {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let make = || {
+        let folder = scratch("linked");
+        for name in ["libcutis.so", concat!("libcutis.so.", env!("CARGO_PKG_VERSION_MAJOR"))] {
+            let _ = std::fs::remove_file(folder.join(name));
+            std::os::unix::fs::symlink(library(), folder.join(name)).unwrap();
+        }
+        folder
+    };
+    FOLDER.get_or_init(make).clone()
+}
+
 /// Compiles `source` strictly, runs it, returns what it says.
 fn build_and_run(compiler: &str, standard: &str, source: &Path, valgrind: bool) -> String {
     let program = scratch("c").join(format!("{}_{compiler}", source.file_stem().unwrap().to_string_lossy()));
-    let folder = library().parent().unwrap().to_owned();
+    let folder = linked();
     run(Command::new(compiler)
         .args([standard, "-O1", "-g", "-Wall", "-Wextra", "-pedantic", "-Werror", "-I"])
         .arg(root().join("include"))

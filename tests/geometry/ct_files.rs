@@ -201,3 +201,13 @@ fn cut_nifti_is_told() {
     }
     assert!(matches!(read_volume(Path::new("nowhere.nii")).unwrap_err(), IoError::File { .. }));
 }
+
+#[test]
+fn samples_are_not_read_from_a_device() {
+    let path = scratch("endless").with_extension("nhdr");
+    let header = "NRRD0004\ntype: short\ndimension: 3\nspace: lps\nsizes: 3 2 2\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n\
+                  encoding: raw\ndata file: /dev/zero\n";
+    std::fs::write(&path, header).unwrap();
+    let message = read_volume(&path).unwrap_err().to_string();
+    assert!(cfg!(not(unix)) || message.contains("no file: /dev/zero"), "{message}");
+}

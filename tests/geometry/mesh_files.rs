@@ -223,3 +223,16 @@ fn baked_model_of_50k_tets_reads_fast() {
     let ms = start.elapsed().as_secs_f64() * 1e3;
     assert!(ms < 50.0, "{ms} ms");
 }
+
+/// Found by the fuzzer: volumes that are positive on paper, but no element has an inverse with them.
+#[test]
+fn elements_that_are_flat_to_rounding_or_beyond_all_numbers_are_refused() {
+    for (scale, height) in [(1.0, 1e-17), (1e-110, 1e-110), (1e120, 1e120)] {
+        let nodes = [[0.0; 3], [scale, 0.0, 0.0], [0.0, scale, 0.0], [0.0, 0.0, height]].map(Vec3::from).to_vec();
+        let tissue = vec!["tissue".to_string()];
+        let mesh =
+            TetMesh { nodes, tets: vec![[0, 1, 2, 3]], region: vec![0], region_names: tissue, ..TetMesh::default() };
+        let told = mesh.checked().unwrap_err().to_string();
+        assert!(told.contains("must be positive"), "{scale} {height}: {told}");
+    }
+}

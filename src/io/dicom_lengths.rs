@@ -1,0 +1,140 @@
+//! Whether a DICOM file can hold what its elements claim. The parser makes room for a claim before it reads, so a file of
+//! a few hundred bytes could ask for gigabytes.
+//!
+//! Source: DICOM PS3.5 2024, 7.1 (data elements) and 7.5 (sequences, items, undefined lengths).
+
+/// Preamble and mark before the first element.
+const START: usize = 132;
+/// Length of a sequence or an item that ends with a delimiter.
+const UNDEFINED: u32 = u32::MAX;
+/// Group of items and delimiters, and the first bytes of an item.
+const ITEMS: u16 = 0xFFFE;
+/// Value representations whose length takes four bytes behind two that are reserved.
+const LONG: [&[u8; 2]; 13] =
+    [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT", b"UV"];
+
+/// An element that claims more than is left.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Claim {
+    pub group: u16,
+    pub element: u16,
+    pub bytes: u32,
+    pub left: usize,
+}
+
+/// How the data set behind the file meta group (which is always explicit and little-endian) is written.
+#[derive(Clone, Copy)]
+struct Syntax {
+    explicit: bool,
+    little: bool,
+}
+
+/// Walks over headers; sequences and items are entered by going on behind theirs.
+///
+/// # Errors
+/// The first [`Claim`] that the file cannot hold. What the walk does not understand it leaves to the parser.
+pub(super) fn lengths_fit(file: &[u8]) -> Result<(), Claim> {
+    const META: Syntax = Syntax { explicit: true, little: true };
+    let after_meta = data_set(file);
+    let (mut at, mut in_meta) = (START, true);
+    while let Some(head) = file.get(at..at + 8) {
+        in_meta &= head[..2] == [2, 0];
+        let syntax = if in_meta { META } else { after_meta };
+        let word = |k: usize| {
+            let bytes = [head[k], head[k + 1]];
+            if syntax.little { u16::from_le_bytes(bytes) } else { u16::from_be_bytes(bytes) }
+        };
+        let (group, element) = (word(0), word(2));
+        let vr = &head[4..6];
+        let long = LONG.iter().any(|v| v[..] == *vr);
+        let (header, bytes) = if group == ITEMS || !syntax.explicit {
+            (8, length(file, at + 4, syntax.little))
+        } else if long || !vr.iter().all(u8::is_ascii_uppercase) {
+            (12, length(file, at + 8, syntax.little))
+        } else {
+            (8, Some(u32::from(word(6))))
+        };
+        let Some(bytes) = bytes else { return Ok(()) };
+        at += header;
+        if bytes == UNDEFINED {
+            if vr == b"UN" && syntax.explicit {
+                return Ok(()); // what follows is written another way
+            }
+            continue;
+        }
+        let left = file.len().saturating_sub(at);
+        if bytes as usize > left {
+            return Err(Claim { group, element, bytes, left });
+        }
+        let entered = group == ITEMS || vr == b"SQ" && syntax.explicit || !syntax.explicit && begins_item(&file[at..]);
+        at += if entered { 0 } else { bytes as usize };
+    }
+    Ok(())
+}
+
+fn length(file: &[u8], at: usize, little: bool) -> Option<u32> {
+    let bytes = file.get(at..at + 4)?.try_into().ok()?;
+    Some(if little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) })
+}
+
+/// An implicit sequence shows only in what it holds.
+fn begins_item(content: &[u8]) -> bool {
+    content.starts_with(&[0xFE, 0xFF, 0x00, 0xE0])
+}
+
+/// The transfer syntax, looked up in the meta group by its identifier.
+fn data_set(file: &[u8]) -> Syntax {
+    const KEY: &[u8] = b"\x02\x00\x10\x00UI";
+    let found = file.windows(KEY.len()).skip(START).position(|w| w == KEY).map(|k| START + k + KEY.len());
+    let uid = found.and_then(|at| {
+        let n = u16::from_le_bytes(file.get(at..at + 2)?.try_into().ok()?);
+        file.get(at + 2..at + 2 + usize::from(n))
+    });
+    match uid.map(|u| u.strip_suffix(b"\0").unwrap_or(u)) {
+        Some(b"1.2.840.10008.1.2") => Syntax { explicit: false, little: true },
+        Some(b"1.2.840.10008.1.2.2") => Syntax { explicit: true, little: false },
+        _ => Syntax { explicit: true, little: true },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file with this transfer syntax and these bytes as data set.
+    fn file(uid: &[u8], data: &[u8]) -> Vec<u8> {
+        let mut out = vec![0; 128];
+        out.extend(b"DICM\x02\x00\x10\x00UI");
+        out.extend((uid.len() as u16).to_le_bytes());
+        out.extend(uid);
+        out.extend(data);
+        out
+    }
+
+    #[test]
+    fn claims_are_held_against_the_file() {
+        let explicit = b"1.2.840.10008.1.2.1\0";
+        let sound = file(explicit, b"\x08\x00\x60\x00CS\x02\x00CT\xe0\x7f\x10\x00OW\x00\x00\x04\x00\x00\x00abcd");
+        assert_eq!(lengths_fit(&sound), Ok(()));
+        let huge = file(explicit, b"\x08\x00\x60\x00CS\x02\x00CT\xe0\x7f\x10\x00OW\x00\x00\x00\x00\x00\x7fabcd");
+        let claim = Claim { group: 0x7fe0, element: 0x0010, bytes: 0x7f00_0000, left: 4 };
+        assert_eq!(lengths_fit(&huge), Err(claim));
+    }
+
+    #[test]
+    fn sequences_are_entered() {
+        let inside = b"\xfe\xff\x00\xe0\xff\xff\xff\xff\x08\x00\x01\x00OB\x00\x00\x00\x00\x00\x70";
+        let mut data = b"\x08\x00\x40\x11SQ\x00\x00\xff\xff\xff\xff".to_vec();
+        data.extend(inside);
+        assert!(lengths_fit(&file(b"1.2.840.10008.1.2.1\0", &data)).is_err());
+        let mut implicit = b"\x08\x00\x40\x11\x10\x00\x00\x00".to_vec();
+        implicit.extend(b"\xfe\xff\x00\xe0\xff\xff\xff\xff\x08\x00\x01\x00\x00\x00\x00\x70");
+        assert!(lengths_fit(&file(b"1.2.840.10008.1.2\0", &implicit)).is_err());
+        let big = b"\x7f\xe0\x00\x10OW\x00\x00\x7f\x00\x00\x00ab";
+        assert!(lengths_fit(&file(b"1.2.840.10008.1.2.2\0", big)).is_err());
+        assert_eq!(
+            lengths_fit(&file(b"1.2.840.10008.1.2.2\0", b"\x7f\xe0\x00\x10OW\x00\x00\x00\x00\x00\x02ab")),
+            Ok(())
+        );
+    }
+}
