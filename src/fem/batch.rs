@@ -235,10 +235,11 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for AddHessian<'_, M,
                     let InvariantTangent { one, ff, fg, gg, spin } =
                         InvariantTangent { one: w * t.one, ff: w * t.ff, fg: w * t.fg, gg: w * t.gg, spin: w * t.spin };
                     let mut dN = [[Lane::splat(simd, 0.0); 3]; N];
-                    for a in 1..N {
-                        dN[a] = vector.dN(q, a);
+                    let (first, others) = dN.split_first_mut().expect("an element has nodes");
+                    for (a, dN) in (1..).zip(others) {
+                        *dN = vector.dN(q, a);
                         for c in 0..3 {
-                            dN[0][c] = dN[0][c] - dN[a][c];
+                            first[c] = first[c] - dN[c];
                         }
                     }
                     let mut along = [([Lane::splat(simd, 0.0); 3], [Lane::splat(simd, 0.0); 3]); N];
