@@ -123,10 +123,11 @@ fn numbers(taste: &mut Taste) -> [f64; ROOM] {
 /// The bytes as they were saved, or with a few changes and the old checksum.
 fn damaged(bytes: &[u8], taste: &mut Taste) -> Vec<u8> {
     let few = [taste.byte(), taste.byte(), taste.byte(), taste.byte()];
-    edited(bytes.to_vec(), &mut Taste(if few[0] % 2 == 0 { &[] } else { &few }))
+    edited(bytes.to_vec(), &mut Taste(if few[0].is_multiple_of(2) { &[] } else { &few }))
 }
 
 impl Slot {
+    #[expect(clippy::missing_transmute_annotations, reason = "the status of a log message has no public name")]
     unsafe fn call3(&mut self, taste: &mut Taste, bytes: &mut Vec<u8>) -> i32 {
         let i = self.instance;
         let k = taste.below(STATES);
