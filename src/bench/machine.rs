@@ -14,8 +14,6 @@ const SUMS: usize = 16;
 /// Times that two cores read their lists, and tries of that.
 const PASSES: usize = 8;
 const TRIES: usize = 5;
-/// Rounds of multiply-adds of a measurement.
-const ROUNDS: usize = 100_000;
 
 /// Bytes a second that one core reads, again and again, from a list of `bytes` bytes: large lists lie in memory, small
 /// ones in a cache.
@@ -57,17 +55,6 @@ pub fn second_core(bytes: usize) -> f64 {
     2.0 * alone / both
 }
 
-/// Multiplications and additions a second in single precision that one core does in its registers.
-pub fn multiply_adds() -> f64 {
-    let mut count = 0;
-    let time = median_time(LONG_ENOUGH, || {
-        let (value, n) = Arch::new().dispatch(Multiply(black_box(0.999_999)));
-        black_box(value);
-        count = n;
-    });
-    2.0 * count as f64 / time
-}
-
 struct Sum<'a>(&'a [f32]);
 
 impl WithSimd for Sum<'_> {
@@ -82,26 +69,5 @@ impl WithSimd for Sum<'_> {
             }
         }
         sums.iter().map(|sum| simd.reduce_sum_f32s(*sum)).sum()
-    }
-}
-
-struct Multiply(f32);
-
-impl WithSimd for Multiply {
-    type Output = (f32, usize);
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> (f32, usize) {
-        let factor = simd.splat_f32s(self.0);
-        let mut sums = [simd.splat_f32s(1.0); SUMS];
-        for _ in 0..ROUNDS {
-            // A new list, so that the sums stay in registers.
-            let mut next = sums;
-            for (next, sum) in next.iter_mut().zip(&sums) {
-                *next = simd.mul_add_f32s(*sum, factor, factor);
-            }
-            sums = next;
-        }
-        (sums.iter().map(|sum| simd.reduce_sum_f32s(*sum)).sum(), ROUNDS * SUMS * S::F32_LANES)
     }
 }

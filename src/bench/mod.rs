@@ -1,7 +1,7 @@
-//! How fast the parts of a step are, as shares of what this machine's memory and arithmetic allow.
+//! How fast the parts of a step are, beside what this machine's memory allows.
 //!
 //! ```text
-//! machine: bytes read a second, multiply-adds a second      parts: forces, stiffness, factor, solve on a block
+//! machine: bytes read a second      parts: forces, stiffness, factor, solve on a block
 //! steps:   CPU time, linear solves and error of the skin in scenes that other codes are measured in, too
 //! ```
 #![forbid(unsafe_code)]
@@ -12,7 +12,7 @@ mod parts;
 mod scenes;
 mod steps;
 
-pub use machine::{bandwidth, multiply_adds, second_core};
+pub use machine::{bandwidth, second_core};
 pub use parts::{Parts, parts};
 pub use scenes::{SCENES, SIZES, Scene, Size};
 pub use steps::{Steps, steps};

@@ -1,6 +1,6 @@
 //! `cutis bench`: the time of a step and of its parts, beside what this machine allows.
 
-use cutis::bench::{SCENES, SIZES, Size, bandwidth, multiply_adds, parts, second_core, steps};
+use cutis::bench::{SCENES, SIZES, Size, bandwidth, parts, second_core, steps};
 
 /// Bytes far beyond any cache.
 const IN_MEMORY: usize = 256 << 20;
@@ -29,10 +29,9 @@ impl Bench {
         let largest = SIZES.iter().position(|s| s.name == self.up_to).unwrap_or(SIZES.len() - 1);
         let sizes = &SIZES[..=largest];
         say!(
-            "CPU time of one thread, median. This core reads {:.1} GB/s from memory and does {:.0} GF/s in single precision; \
+            "CPU time of one thread, median. This core reads {:.1} GB/s from memory; \
              two cores read {:.2} times as much as one from memory, and {:.2} times from the cache.\n",
             1e-9 * bandwidth(IN_MEMORY),
-            1e-9 * multiply_adds(),
             second_core(IN_MEMORY),
             second_core(IN_CACHE)
         );
