@@ -77,6 +77,11 @@ class Sim {
         char why[reason] = "";
         return Sim(cutis_sim_new_from_text(scene.c_str(), folder.c_str(), why, sizeof why), why);
     }
+    /// Of a baked scene: its text, and the bytes of its mesh `model.cutis`.
+    static Sim from_baked(const std::string &scene, const std::vector<unsigned char> &mesh) {
+        char why[reason] = "";
+        return Sim(cutis_sim_new_from_baked(scene.c_str(), mesh.data(), mesh.size(), why, sizeof why), why);
+    }
     /// Of the synthetic head.
     static Sim standard() {
         char why[reason] = "";
@@ -87,6 +92,8 @@ class Sim {
     void initialise() { check(cutis_sim_initialise(sim())); }
     /// Advances by `dt` seconds.
     void step(double dt) { check(cutis_sim_step(sim(), dt)); }
+    /// Advances to time `t` (s) in equal steps of at most `dt` seconds.
+    void run_until(double t, double dt) { check(cutis_sim_run_until(sim(), t, dt)); }
     /// As new.
     void reset() { check(cutis_sim_reset(sim())); }
     /// Simulation time, s.
@@ -123,6 +130,12 @@ class Sim {
     }
     /// Numbers in a port.
     std::size_t size(std::size_t port) const { return cutis_port_len(sim(), port); }
+    /// Smallest and largest legal value in a port; infinite where there is no bound.
+    std::pair<double, double> range(std::size_t port) const {
+        std::pair<double, double> bounds;
+        check(cutis_port_range(sim(), port, &bounds.first, &bounds.second));
+        return bounds;
+    }
     /// Number type of a port.
     CutisType type(std::size_t port) const { return cutis_port_type(sim(), port); }
     /// Who writes a port.

@@ -17,6 +17,8 @@ use crate::sim::{Sim, SimError, State};
 
 /// Moves on a break of the binary interface only; names are added, their meaning never changes.
 const ABI: u32 = 1;
+/// Most steps of one cutis_sim_run_until.
+const MOST_STEPS: f64 = 1e6;
 
 /// What a call came to. Numbers are fixed for ever.
 #[repr(C)]
@@ -286,6 +288,34 @@ pub unsafe extern "C" fn cutis_sim_new_from_text(
     }
 }
 
+/// A simulation of a baked scene, at rest at t = 0 s: `scene` is the text (UTF-8 TOML) whose `[mesh] file` is
+/// "model.cutis", and the `len` bytes at `mesh` are what that file would hold. `cutis fmu` packs both under resources/. No
+/// file is read.
+///
+/// Returns NULL on failure; the reason is then in `why`, cut to `why_len` bytes with its closing zero. `why` may be NULL.
+/// Free with cutis_sim_free.
+///
+/// # Safety
+/// `scene` is NULL or a zero-terminated string; `mesh` is NULL or holds `len` bytes; `why` is NULL or holds `why_len` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_new_from_baked(
+    scene: *const c_char,
+    mesh: *const u8,
+    len: usize,
+    why: *mut c_char,
+    why_len: usize,
+) -> *mut CutisSim {
+    // SAFETY: the caller's promise about `scene`, `mesh` and `why`.
+    unsafe {
+        let (scene, mesh) = (pointer::text(scene), pointer::slice(mesh, len, "mesh"));
+        new_sim(why, why_len, || {
+            let scene = scene.ok_or("`scene` is NULL or not UTF-8")?.to_owned();
+            let mesh = mesh.map_err(|refusal| refusal.message)?.to_vec();
+            load::Baked { scene, mesh }.load().map_err(in_words)
+        })
+    }
+}
+
 /// A simulation of the scene inside the library, a synthetic head, at rest at t = 0 s. No file is read.
 ///
 /// Returns NULL on failure; the reason is then in `why`, cut to `why_len` bytes with its closing zero. `why` may be NULL.
@@ -323,7 +353,7 @@ pub unsafe extern "C" fn cutis_sim_message(sim: *const CutisSim, buffer: *mut c_
         .unwrap_or(0)
 }
 
-/// What to know about the last cutis_sim_step or cutis_sim_initialise that was done, or about the scene before the
+/// What to know about the last cutis_sim_step, cutis_sim_run_until or cutis_sim_initialise that was done, or about the scene before the
 /// first: one line each, empty as a rule. Inverted elements and jumps between bones are told here.
 ///
 /// Copies as cutis_sim_message does.
@@ -491,6 +521,32 @@ pub unsafe extern "C" fn cutis_port_causality(sim: *const CutisSim, port: usize)
     unsafe { ask(sim, port, CutisCausality::CUTIS_NO_CAUSALITY, answer) }
 }
 
+/// Smallest and largest legal value of each element of a port, in its SI unit; minus and plus infinity where there is no
+/// such bound.
+///
+/// CUTIS_ARGUMENT: no such port; nothing is written then.
+///
+/// # Safety
+/// `sim` is NULL or a live handle; `smallest` and `largest` are NULL or the place of a number.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_port_range(
+    sim: *const CutisSim,
+    port: usize,
+    smallest: *mut f64,
+    largest: *mut f64,
+) -> CutisStatus {
+    let body = |inner: &mut Inner| {
+        let port = port_at(inner, port)?;
+        // SAFETY: the caller's promise.
+        let (smallest, largest) = unsafe { (place(smallest, "smallest")?, place(largest, "largest")?) };
+        *smallest = port.min.unwrap_or(f64::NEG_INFINITY);
+        *largest = port.max.unwrap_or(f64::INFINITY);
+        Ok(())
+    };
+    // SAFETY: the caller's promise; nothing is written through the pointer but what the guard itself keeps.
+    unsafe { with(sim.cast_mut(), body) }
+}
+
 /// Sets all values of an input or parameter, row-major, in the port's SI unit. Nothing is computed or allocated.
 ///
 /// CUTIS_ARGUMENT: no such port, it cannot be set, `len` is not its length, or a value is not finite or out of range.
@@ -650,6 +706,43 @@ pub unsafe extern "C" fn cutis_sim_step(sim: *mut CutisSim, dt: f64) -> CutisSta
         }
         let report = inner.sim.step(dt).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))?;
         inner.warning = report.warnings.join("\n");
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { with(sim, body) }
+}
+
+/// Advances to time `t` (s) in equal steps of at most `dt` seconds, with the inputs as they stand now; nothing is done where
+/// `t` is the time already.
+///
+/// CUTIS_ARGUMENT: `t` lies before the time or is not finite, `dt` is not positive and finite, or it would take more than a
+/// million steps. CUTIS_STEP: a step failed; the simulation then stands at its last accepted step, and cutis_sim_time tells
+/// how far it came.
+///
+/// # Safety
+/// `sim` is NULL or a live handle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_run_until(sim: *mut CutisSim, t: f64, dt: f64) -> CutisStatus {
+    let body = |inner: &mut Inner| {
+        let left = t - inner.sim.time();
+        if !(left.is_finite() && left >= 0.0) {
+            return Err(argument(format!("time {t} s does not lie ahead of {} s", inner.sim.time())));
+        }
+        if !(dt.is_finite() && dt > 0.0) {
+            return Err(argument(format!("step size {dt} is not positive and finite")));
+        }
+        // What rounding leaves over is no further step.
+        let steps = (left / dt * (1.0 - 1e-12)).ceil();
+        if steps > MOST_STEPS {
+            return Err(argument(format!("{left} s in steps of {dt} s are more than {MOST_STEPS} steps")));
+        }
+        let mut warnings = Vec::new();
+        for to_go in (1..=steps as u32).rev() {
+            let step = (t - inner.sim.time()) / f64::from(to_go);
+            let report = inner.sim.step(step).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))?;
+            warnings.extend(report.warnings);
+            inner.warning = warnings.join("\n");
+        }
         Ok(())
     };
     // SAFETY: the caller's promise.

@@ -2,6 +2,7 @@
 
 use std::io::{Cursor, Read};
 
+use cutis::ffi::capi;
 use cutis::fmu::{Binary, FmiVersion, PackageError, Platform, description, package};
 
 use super::util::{library, root, scratch};
@@ -196,4 +197,27 @@ fn an_archive_takes_one_library_a_platform() {
     let message = pack(&[other("aarch64-darwin", windows)]).unwrap_err().to_string();
     assert_eq!(message, "the library for aarch64-darwin is one for x86_64-windows");
     assert!(matches!(pack(&[other("x86_64-linux", b"text".to_vec())]), Err(PackageError::Foreign { found: None, .. })));
+}
+
+#[test]
+fn a_baked_scene_is_a_simulation_without_files() {
+    let baked = cutis::load::baked_default().unwrap();
+    let scene = std::ffi::CString::new(baked.scene).unwrap();
+    let mut why = [0; 256];
+    // SAFETY: all pointers are of live buffers of the lengths beside them.
+    let token = unsafe {
+        let sim = capi::cutis_sim_new_from_baked(
+            scene.as_ptr(),
+            baked.mesh.as_ptr(),
+            baked.mesh.len(),
+            why.as_mut_ptr(),
+            why.len(),
+        );
+        assert!(!sim.is_null());
+        let mut token = [0; 64];
+        capi::cutis_sim_token(sim, token.as_mut_ptr(), token.len());
+        capi::cutis_sim_free(sim);
+        std::ffi::CStr::from_ptr(token.as_ptr()).to_str().unwrap().to_owned()
+    };
+    assert_eq!(token, cutis::load::embedded().unwrap().model.token());
 }

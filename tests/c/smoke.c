@@ -22,6 +22,7 @@ static double *values_of(const CutisSim *sim, size_t port) {
 
 static void describe(const CutisSim *sim) {
     size_t i, n = cutis_port_count(sim);
+    double smallest, largest;
     CHECK(n > 3);
     for (i = 0; i < n; ++i) {
         char name[128], unit[32], little[4] = "???";
@@ -37,7 +38,10 @@ static void describe(const CutisSim *sim) {
         CHECK(product == cutis_port_len(sim, i));
         CHECK(cutis_port_type(sim, i) != CUTIS_NO_TYPE);
         CHECK(cutis_port_causality(sim, i) != CUTIS_NO_CAUSALITY);
+        CHECK(cutis_port_range(sim, i, &smallest, &largest) == CUTIS_OK && smallest < largest);
+        CHECK(cutis_port_range(sim, i, NULL, &largest) == CUTIS_NULL);
     }
+    CHECK(cutis_port_range(sim, n, &smallest, &largest) == CUTIS_ARGUMENT);
     CHECK(cutis_port_find(sim, "no.such.port") == SIZE_MAX);
     CHECK(cutis_port_find(sim, NULL) == SIZE_MAX);
     CHECK(cutis_port_name(sim, n, NULL, 0) == 0);
@@ -48,6 +52,7 @@ static void describe(const CutisSim *sim) {
 static void misuse(CutisSim *sim, size_t bones, size_t skin) {
     char message[512];
     double nan3[3] = {0.0, 0.0, 0.0};
+    const unsigned char bytes3[3] = {1, 2, 3};
     double *d = values_of(sim, bones);
     size_t n = cutis_port_len(sim, bones);
     CHECK(cutis_sim_set_f64(NULL, bones, d, n) == CUTIS_NULL);
@@ -63,6 +68,14 @@ static void misuse(CutisSim *sim, size_t bones, size_t skin) {
     CHECK(cutis_sim_step(sim, -1.0) == CUTIS_ARGUMENT);
     CHECK(cutis_sim_step(sim, NAN) == CUTIS_ARGUMENT);
     CHECK(cutis_sim_step(NULL, 1.0) == CUTIS_NULL);
+    CHECK(cutis_sim_run_until(NULL, 1.0, 0.1) == CUTIS_NULL);
+    CHECK(cutis_sim_run_until(sim, -1.0, 0.1) == CUTIS_ARGUMENT);
+    CHECK(cutis_sim_run_until(sim, NAN, 0.1) == CUTIS_ARGUMENT);
+    CHECK(cutis_sim_run_until(sim, 1.0, 0.0) == CUTIS_ARGUMENT);
+    CHECK(cutis_sim_run_until(sim, 1.0, 1e-12) == CUTIS_ARGUMENT);
+    CHECK(cutis_sim_run_until(sim, cutis_sim_time(sim), 0.1) == CUTIS_OK);
+    CHECK(cutis_sim_new_from_baked("", bytes3, sizeof bytes3, message, sizeof message) == NULL && message[0] != 0);
+    CHECK(cutis_sim_new_from_baked(NULL, NULL, 1, message, sizeof message) == NULL && strstr(message, "scene") != NULL);
     CHECK(cutis_sim_set_time(sim, INFINITY) == CUTIS_ARGUMENT);
     CHECK(isnan(cutis_sim_time(NULL)));
     CHECK(cutis_sim_restore(sim, NULL) == CUTIS_NULL);
@@ -118,6 +131,13 @@ int main(int argc, char **argv) {
     CHECK(cutis_sim_step(sim, 0.015625) == CUTIS_OK);
     CHECK(cutis_sim_time(sim) == 0.015625);
     CHECK(cutis_sim_get_f64(sim, skin, x, n) == CUTIS_OK);
+
+    /* Until a time, in steps of no more than a given length: the same bits for the same steps. */
+    CHECK(cutis_sim_restore(sim, state) == CUTIS_OK);
+    CHECK(cutis_sim_run_until(sim, 0.015625, 1.0) == CUTIS_OK && cutis_sim_time(sim) == 0.015625);
+    CHECK(cutis_sim_get_f64(sim, skin, y, n) == CUTIS_OK);
+    CHECK(memcmp(x, y, n * sizeof *x) == 0);
+    CHECK(cutis_sim_run_until(sim, 0.0625, 0.02) == CUTIS_OK && fabs(cutis_sim_time(sim) - 0.0625) < 1e-15);
 
     /* Back, and once more: the same bits. */
     CHECK(cutis_sim_restore(sim, state) == CUTIS_OK);

@@ -21,6 +21,7 @@ int main() {
     assert(sim.type(skin) == CUTIS_FLOAT64 && sim.causality(skin) == CUTIS_OUTPUT);
     assert(sim.ports().size() > 5 && !sim.description(skin).empty() && sim.token().size() == 38);
     assert(sim.get_int("skin.triangles").size() % 3 == 0);
+    assert(std::isinf(sim.range(skin).first) && sim.range(skin).second > 1e300);
 
     const cutis::State rest = sim.save();
     sim.set("bone.translation", {0.0, 0.0, 0.0, 0.002, 0.0, 0.0});
@@ -35,6 +36,10 @@ int main() {
     assert(back != moved && sim.time() == 0.0);
     sim.restore(sim.deserialize(bytes));
     assert(sim.get("skin.position") == moved && std::fabs(sim.time() - 0.1) < 1e-15);
+
+    sim.run_until(0.25, 0.1);
+    assert(std::fabs(sim.time() - 0.25) < 1e-15);
+    sim.restore(sim.deserialize(bytes));
 
     const std::vector<std::size_t> out{skin, sim.port("bone.reactionForce")}, in{sim.port("bone.translation")};
     const std::vector<double> v{0, 0, 0, 1.0, -0.5, 0.25}, Jv = sim.directional_derivative(out, in, v);
@@ -56,11 +61,13 @@ int main() {
     refused(CUTIS_ARGUMENT, "no port", [&] { sim.get("no.such"); });
     refused(CUTIS_ARGUMENT, "", [&] { sim.set("bone.translation", {1.0}); });
     refused(CUTIS_ARGUMENT, "", [&] { sim.step(-1.0); });
+    refused(CUTIS_ARGUMENT, "ahead", [&] { sim.run_until(-1.0, 0.1); });
+    refused(CUTIS_ARGUMENT, "", [&] { cutis::Sim::from_baked(scene, {1, 2, 3}); });
     refused(CUTIS_ARGUMENT, "line 1", [&] { cutis::Sim::from_text("nonsense"); });
     refused(CUTIS_STATE, "", [&] { sim.deserialize(std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + 40)); });
     refused(CUTIS_ARGUMENT, "seed", [&] { sim.directional_derivative(out, in, {1.0}); });
     refused(CUTIS_ARGUMENT, "an input", [&] { sim.adjoint_derivative(out, out, Jv); });
-    assert(thrown == 7);
+    assert(thrown == 9);
     assert(sim.get("skin.position") == moved);
     std::puts("wrapper: all is well");
     return 0;
