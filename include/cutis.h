@@ -113,6 +113,21 @@ struct CutisSim *cutis_sim_new_from_text(const char *scene,
                                          char *why,
                                          size_t why_len);
 
+// A simulation of a baked scene, at rest at t = 0 s: `scene` is the text (UTF-8 TOML) whose `[mesh] file` is
+// "model.cutis", and the `len` bytes at `mesh` are what that file would hold. `cutis fmu` packs both under resources/. No
+// file is read.
+//
+// Returns NULL on failure; the reason is then in `why`, cut to `why_len` bytes with its closing zero. `why` may be NULL.
+// Free with cutis_sim_free.
+//
+// # Safety
+// `scene` is NULL or a zero-terminated string; `mesh` is NULL or holds `len` bytes; `why` is NULL or holds `why_len` bytes.
+struct CutisSim *cutis_sim_new_from_baked(const char *scene,
+                                          const uint8_t *mesh,
+                                          size_t len,
+                                          char *why,
+                                          size_t why_len);
+
 // A simulation of the scene inside the library, a synthetic head, at rest at t = 0 s. No file is read.
 //
 // Returns NULL on failure; the reason is then in `why`, cut to `why_len` bytes with its closing zero. `why` may be NULL.
@@ -140,7 +155,7 @@ size_t cutis_sim_message(const struct CutisSim *sim,
                          char *buffer,
                          size_t len);
 
-// What to know about the last cutis_sim_step or cutis_sim_initialise that was done, or about the scene before the
+// What to know about the last cutis_sim_step, cutis_sim_run_until or cutis_sim_initialise that was done, or about the scene before the
 // first: one line each, empty as a rule. Inverted elements and jumps between bones are told here.
 //
 // Copies as cutis_sim_message does.
@@ -222,6 +237,18 @@ enum CutisType cutis_port_type(const struct CutisSim *sim, size_t port);
 // `sim` is NULL or a live handle.
 enum CutisCausality cutis_port_causality(const struct CutisSim *sim, size_t port);
 
+// Smallest and largest legal value of each element of a port, in its SI unit; minus and plus infinity where there is no
+// such bound.
+//
+// CUTIS_ARGUMENT: no such port; nothing is written then.
+//
+// # Safety
+// `sim` is NULL or a live handle; `smallest` and `largest` are NULL or the place of a number.
+enum CutisStatus cutis_port_range(const struct CutisSim *sim,
+                                  size_t port,
+                                  double *smallest,
+                                  double *largest);
+
 // Sets all values of an input or parameter, row-major, in the port's SI unit. Nothing is computed or allocated.
 //
 // CUTIS_ARGUMENT: no such port, it cannot be set, `len` is not its length, or a value is not finite or out of range.
@@ -282,6 +309,19 @@ enum CutisStatus cutis_sim_initialise(struct CutisSim *sim);
 // `sim` is NULL or a live handle.
 enum CutisStatus cutis_sim_step(struct CutisSim *sim,
                                 double dt);
+
+// Advances to time `t` (s) in equal steps of at most `dt` seconds, with the inputs as they stand now; nothing is done where
+// `t` is the time already.
+//
+// CUTIS_ARGUMENT: `t` lies before the time or is not finite, `dt` is not positive and finite, or it would take more than a
+// million steps. CUTIS_STEP: a step failed; the simulation then stands at its last accepted step, and cutis_sim_time tells
+// how far it came.
+//
+// # Safety
+// `sim` is NULL or a live handle.
+enum CutisStatus cutis_sim_run_until(struct CutisSim *sim,
+                                     double t,
+                                     double dt);
 
 // Change of `unknowns` with `knowns` along `seed`: the Jacobian of the last accepted equilibrium times a vector.
 //
