@@ -2,7 +2,7 @@
 
 use super::Row;
 use super::front::{advice, figure, pareto};
-use crate::view::{Chart, Mark};
+use crate::view::{Chart, Mark, escape};
 
 /// Error over time of all rows; those that are never beaten joined by a line.
 pub fn chart(title: &str, rows: &[Row], floor: Option<f64>) -> Chart {
@@ -67,10 +67,6 @@ pub fn page(title: &str, about: &[String], rows: &[Row], budgets: &[f64], floor:
         chart(title, rows, floor).to_svg(),
         title = escape(title),
     )
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:64rem;margin:2rem auto;padding:0 1rem;color:#222}\

@@ -229,7 +229,8 @@ impl Chart {
     }
 }
 
-fn escape(text: &str) -> String {
+/// `text` with what XML and HTML read as markup written out.
+pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

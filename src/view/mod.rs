@@ -7,7 +7,7 @@ mod font;
 mod image;
 mod render;
 
-pub use chart::{Chart, Mark};
+pub use chart::{Chart, Mark, escape};
 pub use colour::{Rgb, heat};
 pub use image::Image;
 pub use render::{Camera, Surface, draw};
