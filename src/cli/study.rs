@@ -103,7 +103,8 @@ impl Study {
                 .sqrt()
         )];
         about.push(match floor {
-            Some(e) => format!("The reference itself is off by about {:.1e} mm (rms), from the same method on the next coarser mesh; rows below that cannot be told apart.", 1e3 * e),
+            Some(e) if plan.is_of_one_shape() => format!("The reference itself is off by about {:.1e} mm (rms), from the same method on the next coarser mesh; rows below that cannot be told apart.", 1e3 * e),
+            Some(e) => format!("Meshes from files may differ in shape: the reference's method on the next coarser one is {:.1e} mm (rms) away, so below that only rows on the same mesh can be told apart.", 1e3 * e),
             None => "There is no coarser mesh to tell the reference's own error from.".into(),
         });
         about.push("Errors are those of displacements at the vertices of the reference's skin, the largest over the compared instants; force is the largest difference of a bone's reaction in units of the largest reaction. Times are CPU time of one thread, the median step.".into());
@@ -131,10 +132,14 @@ impl Study {
 }
 
 /// Estimated error of the reference, m: the same method on the next coarser mesh is off by `e`; at order one, the least
-/// that jumps at the ends of bones leave, the reference is off by `e / (r - 1)`, r the ratio of edges.
+/// that jumps at the ends of bones leave, the reference is off by `e / (r - 1)`, r the ratio of edges. Meshes of different
+/// shapes have no order: `e` is what they can be told apart by.
 fn own_error(plan: &Plan, rows: &[Row], reference: &Answer) -> Option<f64> {
     let below = plan.below_reference()?.name(&plan.levels);
     let m = rows.iter().find(|row| row.name == below)?.outcome.as_ref().ok()?;
+    if !plan.is_of_one_shape() {
+        return Some(m.errors.rms);
+    }
     let ratio = (reference.n_dofs as f64 / m.n_dofs as f64).cbrt();
     (ratio > 1.1).then(|| m.errors.rms / (ratio - 1.0))
 }

@@ -65,8 +65,6 @@ pub struct Answer {
     pub instants: usize,
     /// Scalar unknowns.
     pub n_dofs: usize,
-    /// Tetrahedra.
-    pub n_tets: usize,
     /// CPU seconds of a step of the programme: the median.
     pub step: f64,
     /// CPU seconds before the first step.
@@ -84,7 +82,7 @@ impl Answer {
         out.text(identity);
         out.f64s(self.u.iter().copied());
         out.f64s(self.reaction.iter().copied());
-        [self.instants, self.n_dofs, self.n_tets, self.memory].into_iter().for_each(|n| out.len(n));
+        [self.instants, self.n_dofs, self.memory].into_iter().for_each(|n| out.len(n));
         [self.step, self.setup, self.solves].into_iter().for_each(|v| out.f64(v));
         out.0
     }
@@ -101,7 +99,6 @@ impl Answer {
                 reaction: from.f64s()?,
                 instants: from.len(0)?,
                 n_dofs: from.len(0)?,
-                n_tets: from.len(0)?,
                 memory: from.len(0)?,
                 step: from.f64()?,
                 setup: from.f64()?,
@@ -132,8 +129,7 @@ pub fn measure(text: &str, folder: Option<&Path>, variant: &Variant, probe: &Pro
     let setup = start.elapsed().as_secs_f64();
     let at = |slot: Slot| model.ports().iter().position(|p| p.slot == slot);
     let rest: Vec<f64> = probe.skin.vertices.iter().flat_map(|x| x.iter().copied()).collect();
-    let n_tets = model.mesh().tets.len();
-    let mut answer = Answer { n_dofs, n_tets, setup, ..Answer::default() };
+    let mut answer = Answer { n_dofs, setup, ..Answer::default() };
     let (mut times, mut solves) = (Vec::new(), 0);
     let (n, s) = (programme.steps(), variant.substeps);
     let mut skin = vec![0.0; rest.len()];

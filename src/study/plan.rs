@@ -185,6 +185,11 @@ impl Plan {
         self.scene.get("name").and_then(Value::as_str).unwrap_or("scene")
     }
 
+    /// Whether the meshes are made of one shape at several resolutions; mesh files may be of different shapes.
+    pub fn is_of_one_shape(&self) -> bool {
+        self.levels.iter().all(|level| !level.mesh.contains_key("file"))
+    }
+
     /// The text of a variant's scene.
     pub fn text(&self, v: &Variant) -> String {
         edit::apply(&self.scene, &self.levels[v.level], &self.small_strain, v)
