@@ -1,6 +1,8 @@
 //! Is the mathematics right: derivatives, invariants, patch tests, closed forms, well-posedness.
 #![allow(non_snake_case)]
 
+#[path = "verify/background.rs"]
+mod background;
 #[path = "verify/bench.rs"]
 mod bench;
 #[path = "verify/common.rs"]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use cutis::load;
 use cutis::sim::Sim;
@@ -44,7 +44,7 @@ impl Run {
             series.add(0.0, model.mesh(), sim.positions())?;
         }
         let bar = progress::bar(programme.steps(), "steps");
-        let (mut iterations, mut spent) = (0, std::time::Duration::ZERO);
+        let (mut iterations, mut spent, mut longest) = (0, Duration::ZERO, Duration::ZERO);
         for k in 1..=programme.steps() {
             let t = k as f64 * programme.dt;
             for s in programme.settings(t) {
@@ -52,7 +52,9 @@ impl Run {
             }
             let before = Instant::now();
             let report = sim.step(programme.dt)?;
-            spent += before.elapsed();
+            let taken = before.elapsed();
+            spent += taken;
+            longest = longest.max(taken);
             iterations += report.iterations;
             for warning in &report.warnings {
                 bar.suspend(|| eprintln!("warning: t = {t} s: {warning}"));
@@ -66,14 +68,15 @@ impl Run {
         bar.finish_and_clear();
         table.save(&self.out.join("ports.csv"))?;
         say!(
-            "{}: {} nodes, {} tets, {} steps of {} s; {:.1} ms and {:.1} linear solves a step",
+            "{}: {} nodes, {} tets, {} steps of {} s; {:.1} ms and {:.1} linear solves a step, the longest {:.1} ms",
             model.name(),
             model.mesh().nodes.len(),
             model.mesh().tets.len(),
             programme.steps(),
             programme.dt,
             1e3 * spent.as_secs_f64() / programme.steps() as f64,
-            f64::from(iterations) / programme.steps() as f64
+            f64::from(iterations) / programme.steps() as f64,
+            1e3 * longest.as_secs_f64()
         );
         say!("wrote {}", self.out.join("ports.csv").display());
         if !self.table_only {

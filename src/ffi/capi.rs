@@ -749,14 +749,16 @@ pub unsafe extern "C" fn cutis_sim_run_until(sim: *mut CutisSim, t: f64, dt: f64
     unsafe { with(sim, body) }
 }
 
-/// Change of `unknowns` with `knowns` along `seed`: the Jacobian of the last accepted equilibrium times a vector.
+/// Change of `unknowns` with `knowns` along `seed`: the Jacobian of the last accepted equilibrium times a vector; in scenes with
+/// inertia or memory that of the last step (of its last piece, where it was cut), the state before it held.
 ///
-/// `unknowns` are ports that depend on the equilibrium (skin.position, marker.position, bone.reactionForce,
+/// `unknowns` are ports that depend on the equilibrium (skin.position, skin.velocity, marker.position, bone.reactionForce,
 /// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
 /// row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
 ///
-/// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `knowns` and `unknowns`. CUTIS_STEP: the
-/// scene has no derivatives (inertia, memory), or no equilibrium yet. `sensitivity` is then of no use.
+/// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `knowns` and `unknowns`. CUTIS_STEP:
+/// there is no equilibrium yet, or in scenes with inertia or memory no step of this handle led to the state (it was restored).
+/// `sensitivity` is then of no use.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
@@ -790,12 +792,13 @@ pub unsafe extern "C" fn cutis_sim_directional_derivative(
 
 /// Gradient of the `unknowns` weighted by `seed` by all `knowns` at once: the transposed Jacobian times a vector.
 ///
-/// `unknowns` are ports that depend on the equilibrium (skin.position, marker.position, bone.reactionForce,
+/// `unknowns` are ports that depend on the equilibrium (skin.position, skin.velocity, marker.position, bone.reactionForce,
 /// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
 /// row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
 ///
-/// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `unknowns` and `knowns`. CUTIS_STEP: the
-/// scene has no derivatives (inertia, memory), or no equilibrium yet. `sensitivity` is then of no use.
+/// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `unknowns` and `knowns`. CUTIS_STEP:
+/// there is no equilibrium yet, or in scenes with inertia or memory no step of this handle led to the state (it was restored).
+/// `sensitivity` is then of no use.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.

@@ -110,23 +110,23 @@ pub fn terminals(model: &Model, icon: bool) -> String {
 
 fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
     let claims: &[&'static str] = match version {
-        FmiVersion::V3 => &["canHandleVariableCommunicationStepSize", "canGetAndSetFMUState", "canSerializeFMUState"],
+        FmiVersion::V3 => &[
+            "canHandleVariableCommunicationStepSize",
+            "canGetAndSetFMUState",
+            "canSerializeFMUState",
+            "providesDirectionalDerivatives",
+            "providesAdjointDerivatives",
+        ],
         FmiVersion::V2 | FmiVersion::V2Full => &[
             "canHandleVariableCommunicationStepSize",
             "canNotUseMemoryManagementFunctions",
             "canGetAndSetFMUstate",
             "canSerializeFMUstate",
+            "providesDirectionalDerivative",
         ],
     };
     let mut attributes: Attributes = vec![("modelIdentifier", MODEL_IDENTIFIER.to_owned())];
     attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
-    if model.has_derivatives() {
-        let claims: &[&'static str] = match version {
-            FmiVersion::V3 => &["providesDirectionalDerivatives", "providesAdjointDerivatives"],
-            FmiVersion::V2 | FmiVersion::V2Full => &["providesDirectionalDerivative"],
-        };
-        attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
-    }
     if version.is_3() {
         attributes.push(("providesIntermediateUpdate", "true".to_owned()));
     }

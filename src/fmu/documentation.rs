@@ -66,11 +66,12 @@ pub fn documentation(model: &Model, version: FmiVersion, picture: bool) -> Strin
         nodes = mesh.nodes.len(),
         tets = mesh.tets.len(),
         kind = if model.parts().inertia.is_some() { "with inertia" } else { "from equilibrium to equilibrium" },
-        derivatives = if model.has_derivatives() {
+        derivatives = if model.remembers() {
+            "Directional (and in FMI 3.0 adjoint) derivatives of skin, markers and reactions by every input and parameter are those of \
+             the last accepted step, the state before it held."
+        } else {
             "Directional (and in FMI 3.0 adjoint) derivatives of skin, markers and reactions by every input and parameter hold at the \
              last accepted step."
-        } else {
-            ""
         },
         warnings = warnings(model),
         version_number = env!("CARGO_PKG_VERSION"),

@@ -192,6 +192,15 @@ impl Builder<'_> {
         let precision = spec.map(|s| self.text.choice("solver", "precision", &s.precision)).transpose()?.flatten();
         let single = precision.map_or(!newton, |p| p == "single");
         let linear = spec.map(|s| self.text.choice("solver", "linear", &s.linear)).transpose()?.flatten();
+        let background = match spec.and_then(|s| s.background.as_ref()) {
+            Some(background) if *background.get_ref() && (newton || linear == Some("iterative")) => {
+                let message = "`background` of [solver] makes a kept factor anew: it wants the methods that keep one, \
+                               `method = \"quasi-newton\"` and `linear = \"direct\"`";
+                return Err(self.text.at(background.span().start, message.into()));
+            }
+            Some(background) => *background.get_ref(),
+            None => false,
+        };
         let strategy = Strategy {
             linear: match linear {
                 Some("direct") => LinearSystems::Direct,
@@ -224,6 +233,7 @@ impl Builder<'_> {
             start,
             may_invert: inversion == Some("allow"),
             strategy,
+            background,
             identity: without_mesh_table(self.text.0),
             warnings,
         })?;

@@ -306,6 +306,7 @@ pub struct SolverSpec {
     pub inversion: Option<Spanned<String>>,
     pub precision: Option<Spanned<String>>,
     pub linear: Option<Spanned<String>>,
+    pub background: Option<Spanned<bool>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -213,6 +213,7 @@ pub const KEYS: &[Key] = &[
     key("solver", "inversion", "string", "", OneOf(&["refuse", "allow"]), "\"refuse\"", "Whether a step that can only end with elements turned inside out is refused, or taken and told where the law has an energy for it (`linear` tissue alone always may)."),
     key("solver", "precision", "string", "", OneOf(&["single", "double"]), "by `method`", "Of the solves with a kept factor: `single` (for `quasi-newton`) takes half the time and leaves the accuracy to `tolerance`, `double` (for `newton`) saves an iteration where a scene is badly conditioned. Residuals and the factor are always in double precision."),
     key("solver", "linear", "string", "", OneOf(&["direct", "iterative"]), "`direct` where its factor fits", "`direct` keeps a factor, which serves many solves; `iterative` runs conjugate gradients in Newton's method, with memory in proportion to the mesh. Without the key factors of more than 400 million numbers are avoided."),
+    key("solver", "background", "boolean", "", Any, "false", "A second thread makes the kept factor anew while steps go on, where a step took six solves or more: no step waits for a factorisation that was foreseen, and fewer solves are needed. Takes matrices and factor twice. The same bits each time, but not those of a scene without."),
     key("run", "dt", "float", "s", Positive, "0.1", "Length of a step."),
     key("run", "end", "float", "s", Positive, "1", "End time."),
     key("keyframe", "t", "float", "s", NonNegative, "required", "Time."),

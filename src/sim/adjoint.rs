@@ -12,8 +12,9 @@
 //!
 //! Source: Griewank & Walther, "Evaluating Derivatives", 2nd ed., 2008, section 15.3, for the implicit function's adjoint.
 
-use super::derivative::{MOST_PASSES, SETTLED, check, has_derivative, is_approximate, mismatch, too_strong};
+use super::derivative::{MOST_PASSES, SETTLED, Sensitivity, has_derivative, is_approximate, mismatch, too_strong};
 use super::model::{Drive, Model};
+use super::past::Past;
 use super::step::{complete, read_pivots};
 use super::{Sim, SimError};
 use crate::fem::{At, Configuration};
@@ -31,11 +32,14 @@ struct Weights {
     pivot: Vec<Vec3>,
     /// Of the nodal gradient.
     eta: Vec<Vec3>,
+    /// Of nodal velocities; they go with the positions.
+    v: Vec<Vec3>,
 }
 
 /// The accepted state with what its transposed stiffness needs.
 struct Place<'a> {
     model: &'a Model,
+    past: &'a Past,
     at: At<'a>,
     config: &'a Configuration,
     /// Pivots at rest, m.
@@ -63,7 +67,6 @@ impl Sim {
         sensitivity: &mut [f64],
     ) -> Result<(), SimError> {
         let model = self.model.clone();
-        check(&model, &self.state)?;
         complete(&model, &mut self.state, &self.work);
         let mut wanted = Vec::new();
         let mut n = 0;
@@ -84,7 +87,13 @@ impl Sim {
         read_pivots(&model, &self.state.applied, &mut pivots);
         let config = self.state.config.clone();
         let inputs = self.state.applied.clone();
-        let at = At { t: self.state.t, inputs: &inputs, x_lag: &config.x, ..At::NOWHERE };
+        let mut unknown_ports = Vec::new();
+        for &unknown in unknowns {
+            let port = self.port(unknown, Type::Float64, "an output that has derivatives", has_derivative)?;
+            unknown_ports.push((port.slot, port.len()));
+        }
+        let Sensitivity { minimiser, past, .. } = self.sensitivity(&model)?;
+        let at = At { x_lag: &config.x, ..past.at(&model, &inputs, &past.x_tilde) };
         let mut g = vec![Vec3::zeros(); config.x.len()];
         for term in &parts.terms {
             term.add_gradient(&at, &config.x, &mut g);
@@ -92,17 +101,16 @@ impl Sim {
         let X = &model.mesh().nodes;
         let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
         let size = (high - low).norm();
-        let place = Place { model: &model, at, config: &config, pivots: &pivots, g: &g, size };
+        let place = Place { model: &model, past, at, config: &config, pivots: &pivots, g: &g, size };
 
         let mut weights = Weights::nothing(&place);
         let mut of_inputs = vec![0.0; inputs.len()];
         let mut left = seed;
-        for &unknown in unknowns {
-            let port = self.port(unknown, Type::Float64, "an output that has derivatives", has_derivative)?;
-            let (w, later) = left.split_at_checked(port.len()).ok_or_else(|| mismatch("seed", port.len(), left))?;
-            match parts.layout.first(port.slot) {
+        for (slot, n) in unknown_ports {
+            let (w, later) = left.split_at_checked(n).ok_or_else(|| mismatch("seed", n, left))?;
+            match parts.layout.first(slot) {
                 Some(first) => of_inputs[first..].iter_mut().zip(w).for_each(|(sum, w)| *sum += w),
-                None => weights.add(&place, port.slot, w),
+                None => weights.add(&place, slot, w),
             }
             left = later;
         }
@@ -110,7 +118,7 @@ impl Sim {
             return Err(mismatch("seed", 0, left));
         }
 
-        let minimiser = &mut self.sensitivity(&model)?.minimiser;
+        weights.settle(&place);
         let repeats = is_approximate(&model, minimiser);
         let lambda = place.solve(&weights, repeats, |d| minimiser.apply_inverse(d))?;
         let xi: Vec<Vec3> = place.spread(&lambda).iter().zip(&weights.eta).map(|(l, e)| l + e).collect();
@@ -136,7 +144,14 @@ impl Weights {
             x: vec![Vec3::zeros(); n],
             pivot: vec![Vec3::zeros(); place.pivots.len()],
             eta: vec![Vec3::zeros(); n],
+            v: Vec::new(),
         }
+    }
+
+    /// Velocities counted as positions.
+    fn settle(&mut self, place: &Place) {
+        let rates = place.past.rates(place.model.dofs());
+        self.x.iter_mut().zip(self.v.drain(..)).zip(rates).for_each(|((x, v), rate)| *x += rate * v);
     }
 
     /// Weighs the rows of one output.
@@ -145,6 +160,10 @@ impl Weights {
         for (k, w) in w.chunks_exact(3).map(Vec3::from_column_slice).enumerate() {
             match slot {
                 Slot::SkinPosition => place.model.skin().add_transposed(k, &w, &mut self.x),
+                Slot::SkinVelocity => {
+                    self.v.resize(self.x.len(), Vec3::zeros());
+                    place.model.skin().add_transposed(k, &w, &mut self.v);
+                }
                 Slot::MarkerPosition => {
                     let marker = &parts.markers[k];
                     place.model.skin().add_within_transposed(marker.nodes, marker.weights, &w, &mut self.x);
@@ -198,9 +217,11 @@ impl Place<'_> {
         let h = CHANGE * self.size / largest;
         let mut sides = [h, -h].map(|h| {
             let x: Vec<Vec3> = self.config.x.iter().zip(xi).map(|(x, xi)| x + h * xi).collect();
+            let x_tilde = self.past.carried(self.model.dofs(), |a| h * xi[a]);
+            let at = At { x_tilde: &x_tilde, ..self.at };
             let mut g = vec![Vec3::zeros(); x.len()];
             for term in terms {
-                term.add_gradient(&self.at, &x, &mut g);
+                term.add_gradient(&at, &x, &mut g);
             }
             g
         });

@@ -4,6 +4,9 @@
 //! g(x, s) = 0   =>   K dx = -(K_p du_p + dg/ds ds),   du_p: motion of the bones' nodes with their poses
 //! ```
 //!
+//! In scenes with inertia or memory g is the gradient of the last piece of time, whose past is held ([`Past`]): the
+//! derivative is that of the map which the piece was, and velocities go with positions as the scheme says.
+//!
 //! One solve with the stiffness of the accepted state, factored when the first derivative there is asked for; the
 //! simulation itself keeps its own factor and its bits. Products on the right are central differences along the seed;
 //! where forces follow the surface, what `K` leaves out of their change is taken in by iteration.
@@ -11,9 +14,10 @@
 //! Source: Oden & Prudhomme, "Estimation of modeling error in computational mechanics", J. Comput. Phys. 182, 2002, for the
 //! linearised equilibrium; the differences are ours.
 
+use super::past::Past;
 use super::step::{place_bones, read_pivots, read_wrenches, target_increments};
 use super::{Model, Sim, SimError, State};
-use crate::fem::{At, Configuration};
+use crate::fem::Configuration;
 use crate::math::Vec3;
 use crate::port::{Slot, Type};
 use crate::solve::{Minimiser, Problem, Strategy};
@@ -26,9 +30,10 @@ const FIRST_CHANGE: f64 = 1e-4;
 pub(super) const MOST_PASSES: usize = 30;
 pub(super) const SETTLED: f64 = 1e-8;
 
-/// The factored stiffness of one accepted state.
+/// The factored stiffness of one accepted state, and the past that led there.
 pub(super) struct Sensitivity {
     pub(super) minimiser: Minimiser,
+    pub(super) past: Past,
     config: Configuration,
     inputs: Vec<f64>,
 }
@@ -39,6 +44,7 @@ struct Moved {
     pivots: Vec<Vec3>,
     wrenches: Vec<(Vec3, Vec3)>,
     config: Configuration,
+    x_tilde: Vec<Vec3>,
 }
 
 /// What a configuration holds the bones with.
@@ -64,12 +70,16 @@ impl Sim {
     /// Change of the ports `unknowns` with the ports `knowns` along `seed`, at the last accepted state: `sensitivity` is
     /// overwritten with the directional derivative of each element of the unknowns, one after another.
     ///
-    /// Knowns are inputs; unknowns are `skin.position`, `marker.position`, `bone.reactionForce` and `bone.reactionTorque`,
-    /// or inputs themselves. Linear in the seed to about eight digits.
+    /// Knowns are inputs; unknowns are `skin.position`, `skin.velocity`, `marker.position`, `bone.reactionForce` and
+    /// `bone.reactionTorque`, or inputs themselves. Linear in the seed to about eight digits.
+    ///
+    /// In scenes with inertia or memory it is the derivative of the last piece of the step (all of it, unless it was cut) by
+    /// the inputs at its end, what came before held.
     ///
     /// # Errors
-    /// [`SimError::NoDerivative`] in scenes with inertia or memory and before the first equilibrium, [`SimError::Port`],
-    /// [`SimError::Range`], and as for [`Sim::step`] if the stiffness cannot be factored. The state does not change.
+    /// [`SimError::NoDerivative`] before the first equilibrium, and in scenes with inertia or memory where no step of this
+    /// run led to the state; [`SimError::Port`], [`SimError::Range`], and as for [`Sim::step`] if the stiffness cannot be
+    /// factored. The state does not change.
     pub fn directional_derivative(
         &mut self,
         knowns: &[usize],
@@ -78,8 +88,8 @@ impl Sim {
         sensitivity: &mut [f64],
     ) -> Result<(), SimError> {
         let model = self.model.clone();
-        check(&model, &self.state)?;
         super::step::complete(&model, &mut self.state, &self.work);
+        self.sensitivity(&model)?;
         let mut direction = vec![0.0; model.parts().layout.len()];
         let mut left = seed;
         for &known in knowns {
@@ -115,7 +125,8 @@ impl Sim {
                 return Err(mismatch("sensitivity", n, left));
             }
             let (now, later) = left.split_at_mut(n);
-            read(&model, &sides, port.slot, &direction, h, now);
+            let past = &self.sensitivity.as_ref().expect("made above").past;
+            read(&model, past, &sides, port.slot, &direction, h, now);
             left = later;
         }
         if left.is_empty() { Ok(()) } else { Err(mismatch("sensitivity", 0, left)) }
@@ -125,10 +136,9 @@ impl Sim {
     /// forces change.
     fn sides(&mut self, model: &Model, direction: &[f64], h: f64, passes: usize) -> Result<Sides, SimError> {
         let parts = model.parts();
-        let here = self.state.config.clone();
+        let Sensitivity { minimiser, past, config: here, inputs: applied } = self.sensitivity(model)?;
         let moved = [1.0, -1.0].map(|sign| {
-            let inputs: Vec<f64> =
-                self.state.applied.iter().zip(direction).map(|(value, d)| value + sign * h * d).collect();
+            let inputs: Vec<f64> = applied.iter().zip(direction).map(|(value, d)| value + sign * h * d).collect();
             let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
             read_pivots(model, &inputs, &mut pivots);
             let mut wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
@@ -140,15 +150,14 @@ impl Sim {
             for (&a, u) in model.dofs().prescribed.iter().zip(&u) {
                 config.x[a as usize] += u;
             }
-            Moved { inputs, pivots, wrenches, config }
+            let x_tilde = past.carried(model.dofs(), |a| config.x[a] - here.x[a]);
+            Moved { inputs, pivots, wrenches, config, x_tilde }
         });
         let n = model.dofs().n_blocks();
         let mut d = vec![Vec3::zeros(); n];
-        let t = self.state.t;
-        let minimiser = &mut self.sensitivity(model)?.minimiser;
         let follows = is_approximate(model, minimiser);
         for _ in 0..passes {
-            let sides = [0, 1].map(|k| moved[k].held(model, t, &d, if k == 0 { h } else { -h }));
+            let sides = [0, 1].map(|k| moved[k].held(model, past, &d, if k == 0 { h } else { -h }));
             let mut change: Vec<Vec3> = sides[0].g.iter().zip(&sides[1].g).map(|(p, m)| (p - m) / (2.0 * h)).collect();
             minimiser.apply_inverse(&mut change);
             let (mut size, mut correction) = (0.0_f64, 0.0_f64);
@@ -158,20 +167,25 @@ impl Sim {
                 correction = correction.max(c.norm());
             }
             if !follows || passes == 1 || correction <= SETTLED * size {
-                let held = |k: usize| moved[k].held(model, t, &d, if k == 0 { h } else { -h });
+                let held = |k: usize| moved[k].held(model, past, &d, if k == 0 { h } else { -h });
                 return Ok(Sides([held(0), held(1)]));
             }
         }
         Err(too_strong())
     }
 
-    /// The factor at the accepted state; made where the last one was another's.
+    /// The factor at the accepted state, and its past; made where the last one was another's.
     pub(super) fn sensitivity(&mut self, model: &Model) -> Result<&mut Sensitivity, SimError> {
         let here = &self.state;
-        let kept = self.sensitivity.take().filter(|s| s.config == here.config && s.inputs == here.applied);
-        let made = match kept {
-            Some(kept) => kept,
-            None => Box::new(Sensitivity::new(model, here)?),
+        if !here.outputs.converged {
+            let why = "there is no equilibrium yet: initialise, or make a step";
+            return Err(SimError::NoDerivative(why.into()));
+        }
+        let past = Past::of(model, here, &self.work)?;
+        let serves = |s: &Sensitivity| s.config == here.config && s.inputs == here.applied && s.past.is_same(&past);
+        let made = match self.sensitivity.take() {
+            Some(kept) if serves(&kept) => kept,
+            other => Box::new(Sensitivity::new(model, here, past, other.map(|other| other.minimiser))?),
         };
         Ok(self.sensitivity.insert(made))
     }
@@ -189,7 +203,8 @@ pub(super) fn too_strong() -> SimError {
 }
 
 impl Sensitivity {
-    fn new(model: &Model, state: &State) -> Result<Sensitivity, SimError> {
+    /// Factors the stiffness at `state`, on the pattern of `before` if there is one.
+    fn new(model: &Model, state: &State, past: Past, before: Option<Minimiser>) -> Result<Sensitivity, SimError> {
         let parts = model.parts();
         let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
         read_pivots(model, &state.applied, &mut pivots);
@@ -201,17 +216,20 @@ impl Sensitivity {
             X: &parts.mesh.nodes,
             pivots: &pivots,
             wrenches: &wrenches,
-            at: At { t: state.t, inputs: &state.applied, ..At::NOWHERE },
+            at: past.at(model, &state.applied, &past.x_tilde),
         };
-        let mut minimiser = Minimiser::new(&problem, Strategy { memory: 0, ..parts.strategy })?;
+        let mut minimiser = match before {
+            Some(minimiser) => minimiser,
+            None => Minimiser::new(&problem, Strategy { memory: 0, ..parts.strategy })?,
+        };
         minimiser.linearise(&problem, &state.config)?;
-        Ok(Sensitivity { minimiser, config: state.config.clone(), inputs: state.applied.clone() })
+        Ok(Sensitivity { minimiser, config: state.config.clone(), inputs: state.applied.clone(), past })
     }
 }
 
 impl Moved {
     /// Gradients with the unknowns moved by `h d`; forces that follow the surface do so.
-    fn held(&self, model: &Model, t: f64, d: &[Vec3], h: f64) -> Held {
+    fn held(&self, model: &Model, past: &Past, d: &[Vec3], h: f64) -> Held {
         let parts = model.parts();
         let mut config = self.config.clone();
         model.dofs().retract(&parts.mesh.nodes, &self.pivots, &self.config, h, d, &mut config);
@@ -221,7 +239,7 @@ impl Moved {
             X: &parts.mesh.nodes,
             pivots: &self.pivots,
             wrenches: &self.wrenches,
-            at: At { t, inputs: &self.inputs, ..At::NOWHERE },
+            at: past.at(model, &self.inputs, &self.x_tilde),
         };
         let mut nodal = vec![Vec3::zeros(); parts.mesh.nodes.len()];
         let mut g = vec![Vec3::zeros(); model.dofs().n_blocks()];
@@ -230,28 +248,19 @@ impl Moved {
     }
 }
 
-pub(super) fn check(model: &Model, state: &State) -> Result<(), SimError> {
-    let why = if !model.has_derivatives() {
-        "the scene has inertia or tissue with a memory, so its state depends on the way it came"
-    } else if !state.outputs.converged {
-        "there is no equilibrium yet: initialise, or make a step"
-    } else {
-        return Ok(());
-    };
-    Err(SimError::NoDerivative(why.into()))
-}
-
 pub(super) fn mismatch(name: &str, wanted: usize, found: &[f64]) -> SimError {
     SimError::Range { name: name.into(), len: found.len(), offset: 0, end: wanted }
 }
 
 pub(super) fn has_derivative(port: &crate::port::Port) -> bool {
-    use Slot::{BoneReactionForce, BoneReactionTorque, MarkerPosition, SkinPosition};
-    port.is_settable() || matches!(port.slot, SkinPosition | MarkerPosition | BoneReactionForce | BoneReactionTorque)
+    use Slot::{BoneReactionForce, BoneReactionTorque, MarkerPosition, SkinPosition, SkinVelocity};
+    let is_one =
+        matches!(port.slot, SkinPosition | SkinVelocity | MarkerPosition | BoneReactionForce | BoneReactionTorque);
+    is_one || port.is_settable()
 }
 
 /// The derivative of one port.
-fn read(model: &Model, sides: &[Held; 2], slot: Slot, direction: &[f64], h: f64, out: &mut [f64]) {
+fn read(model: &Model, past: &Past, sides: &[Held; 2], slot: Slot, direction: &[f64], h: f64, out: &mut [f64]) {
     let of = |value: &dyn Fn(&Held) -> Vec3| (value(&sides[0]) - value(&sides[1])) / (2.0 * h);
     let rows = |row: &dyn Fn(usize, &Held) -> Vec3, out: &mut [f64]| {
         for (k, out) in out.chunks_exact_mut(3).enumerate() {
@@ -261,6 +270,16 @@ fn read(model: &Model, sides: &[Held; 2], slot: Slot, direction: &[f64], h: f64,
     let parts = model.parts();
     match slot {
         Slot::SkinPosition => rows(&|k, side| model.skin().of(k, &side.config.x), out),
+        Slot::SkinVelocity => {
+            let rates = past.rates(model.dofs());
+            let v = sides
+                .each_ref()
+                .map(|side| -> Vec<Vec3> { side.config.x.iter().zip(&rates).map(|(x, rate)| *rate * x).collect() });
+            for (k, out) in out.chunks_exact_mut(3).enumerate() {
+                let [plus, minus] = v.each_ref().map(|v| model.skin().of(k, v));
+                out.copy_from_slice(((plus - minus) / (2.0 * h)).as_slice());
+            }
+        }
         Slot::MarkerPosition => rows(
             &|k, side| {
                 let marker = &parts.markers[k];

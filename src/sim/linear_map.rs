@@ -78,7 +78,7 @@ fn causes(model: &Model) -> Option<Vec<Cause>> {
     if parts.strategy.memory == 0 {
         return None;
     }
-    if !model.is_quadratic() || !model.has_derivatives() || !parts.muscles.is_empty() || !parts.pressures.is_empty() {
+    if !model.is_quadratic() || model.remembers() || !parts.muscles.is_empty() || !parts.pressures.is_empty() {
         return None;
     }
     let mut causes = Vec::new();

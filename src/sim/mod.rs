@@ -4,11 +4,13 @@
 
 mod access;
 mod adjoint;
+mod ahead;
 mod derivative;
 mod linear_map;
 mod model;
 mod motion;
 mod pace;
+mod past;
 mod ports;
 mod recover;
 mod scheme;
@@ -324,9 +326,10 @@ impl Sim {
         self.whole.get_or_init(|| self.save().config.x)
     }
 
-    /// Bytes of matrices, factor and solver, those of the model and of the state left out.
+    /// Bytes of matrices, factor and solver, twice that with a factor made in the background; those of the model and of the
+    /// state left out.
     pub fn memory(&self) -> usize {
-        self.work.minimiser().memory()
+        self.work.minimiser().memory() * if self.model.parts().background { 2 } else { 1 }
     }
 
     /// Stored entries of the stiffness matrix's factor (8 bytes each).

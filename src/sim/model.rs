@@ -113,6 +113,8 @@ pub struct ModelParts {
     pub may_invert: bool,
     /// How the minimum is sought.
     pub strategy: Strategy,
+    /// Whether stale factors are replaced by ones that a second thread makes while steps go on.
+    pub background: bool,
     /// Text that, with the mesh and the ports, identifies the model (the scene).
     pub identity: String,
     /// What the user should know about the model.
@@ -186,9 +188,9 @@ impl Model {
         self
     }
 
-    /// Whether its outputs follow from its inputs alone, so that they have derivatives by them.
-    pub fn has_derivatives(&self) -> bool {
-        self.parts.inertia.is_none() && self.parts.n_history == 0
+    /// Whether its state depends on the way it came: by inertia, or by tissue with a memory.
+    pub fn remembers(&self) -> bool {
+        self.parts.inertia.is_some() || self.parts.n_history > 0
     }
 
     /// Name of the scene.

@@ -141,6 +141,16 @@ impl Formula {
         x - (a + damping * v) / self.coefficient(damping)
     }
 
+    /// How much of its own motion the place where inertia carries a node of a bone follows: d x_tilde_of_bone/dx.
+    pub fn follows_bone(&self, damping: f64) -> f64 {
+        1.0 - (1.0 / self.dt + damping) / (self.dt * self.coefficient(damping))
+    }
+
+    /// dv/dx of a node, 1/s; `of_bone` if a bone moves it.
+    pub fn rate(&self, of_bone: bool) -> f64 {
+        if of_bone { 1.0 / self.dt } else { self.rate }
+    }
+
     /// Velocity at `x` and what is remembered there.
     pub fn arrive(&self, past: &Past, x: &Vec3) -> (Vec3, [Vec3; 2]) {
         let (x_v, x_a) = self.anchors(past);

@@ -24,6 +24,14 @@ pub(super) struct Linearisation {
     pub x_tilde: Vec<Vec3>,
 }
 
+/// A linearisation at an accepted state that is taken up once its factor has had the time to be made beside the steps.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Upcoming {
+    pub linearisation: Arc<Linearisation>,
+    /// Linear solves until then.
+    pub solves: u32,
+}
+
 /// What the last step left for the host to read.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Outputs {
@@ -53,6 +61,8 @@ pub struct State {
     /// Inputs of the last accepted step: where the next one starts from.
     pub(super) applied: Vec<f64>,
     pub(super) linearisation: Option<Arc<Linearisation>>,
+    /// Never there without `[solver] background`.
+    pub(super) upcoming: Option<Upcoming>,
     pub(super) outputs: Outputs,
 }
 
@@ -97,7 +107,7 @@ pub enum StateError {
 }
 
 const MAGIC: &[u8; 8] = b"cutis-st";
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 
 impl State {
     /// At rest, t = 0, inputs at their start values.
@@ -113,6 +123,7 @@ impl State {
             inputs: parts.start.clone(),
             applied: rest_inputs(model),
             linearisation: None,
+            upcoming: None,
             outputs: Outputs {
                 reaction_force: vec![Vec3::zeros(); n],
                 reaction_torque: vec![Vec3::zeros(); n],
@@ -157,13 +168,12 @@ impl State {
         [o.residual, o.kinetic, o.dt].into_iter().for_each(|v| body.f64(v));
         body.u32(u32::from(self.linearisation.is_some()));
         if let Some(l) = &self.linearisation {
-            put_config(&mut body, &l.config);
-            body.f64(l.t);
-            body.f64(l.dt);
-            body.f64(l.dt_before);
-            body.f64s(l.inputs.iter().copied());
-            body.f64s(l.history.iter().copied());
-            put_vectors(&mut body, &l.x_tilde);
+            put_linearisation(&mut body, l);
+        }
+        body.u32(u32::from(self.upcoming.is_some()));
+        if let Some(upcoming) = &self.upcoming {
+            put_linearisation(&mut body, &upcoming.linearisation);
+            body.u32(upcoming.solves);
         }
         let mut out = Writer::default();
         out.raw(MAGIC);
@@ -212,18 +222,14 @@ impl State {
         let [residual, kinetic, dt] = [r.f64()?, r.f64()?, r.f64()?];
         let linearisation = match r.u32()? {
             0 => None,
-            _ => Some(Arc::new(Linearisation {
-                config: take_config(&mut r, n, n_bones)?,
-                t: r.f64()?,
-                dt: r.f64()?,
-                dt_before: r.f64()?,
-                inputs: take_f64s(&mut r, "inputs", n_inputs)?,
-                history: take_f64s(&mut r, "remembered values", parts.n_history)?,
-                x_tilde: take_vectors(&mut r, "inertial predictions", motion.v.len())?,
-            })),
+            _ => Some(Arc::new(take_linearisation(&mut r, model)?)),
+        };
+        let upcoming = match r.u32()? {
+            0 => None,
+            _ => Some(Upcoming { linearisation: Arc::new(take_linearisation(&mut r, model)?), solves: r.u32()? }),
         };
         let outputs = Outputs { reaction_force, reaction_torque, iterations, residual, converged, kinetic, dt };
-        Ok(State { t, config, partial: false, motion, history, inputs, applied, linearisation, outputs })
+        Ok(State { t, config, partial: false, motion, history, inputs, applied, linearisation, upcoming, outputs })
     }
 }
 
@@ -251,6 +257,28 @@ fn put_config(w: &mut Writer, config: &Configuration) {
     for pose in &config.poses {
         pose.t.iter().chain(pose.R.iter()).for_each(|c| w.f64(*c));
     }
+}
+
+fn put_linearisation(w: &mut Writer, l: &Linearisation) {
+    put_config(w, &l.config);
+    [l.t, l.dt, l.dt_before].into_iter().for_each(|v| w.f64(v));
+    w.f64s(l.inputs.iter().copied());
+    w.f64s(l.history.iter().copied());
+    put_vectors(w, &l.x_tilde);
+}
+
+fn take_linearisation(r: &mut Reader, model: &Model) -> Result<Linearisation, StateError> {
+    let parts = model.parts();
+    let n = parts.mesh.nodes.len();
+    Ok(Linearisation {
+        config: take_config(r, n, parts.bones.len())?,
+        t: r.f64()?,
+        dt: r.f64()?,
+        dt_before: r.f64()?,
+        inputs: take_f64s(r, "inputs", parts.layout.len())?,
+        history: take_f64s(r, "remembered values", parts.n_history)?,
+        x_tilde: take_vectors(r, "inertial predictions", if parts.inertia.is_some() { n } else { 0 })?,
+    })
 }
 
 fn expect_len(what: &'static str, found: usize, wanted: usize) -> Result<(), StateError> {

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use super::ahead::Ahead;
 use super::linear_map::LinearMap;
 use super::model::{Drive, Model};
 use super::motion::Motion;
@@ -12,7 +13,7 @@ use super::pace::{Pace, even_part};
 use super::recover::untangle;
 use super::scheme::Scheme;
 use super::start::accelerations;
-use super::state::{Linearisation, State};
+use super::state::{Linearisation, State, Upcoming};
 use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
 use crate::math::{Mat3, Pose, Vec3, best_fit};
@@ -37,6 +38,8 @@ const MODULUS_DRIFT: f64 = 0.1;
 const LARGEST_JUMP: f64 = 0.3;
 /// The bones' common rigid motion is taken out first where it explains all but this part of their motion.
 const RIGID_REMAINDER: f64 = 0.5;
+/// Linear solves of a piece from which on a factor is due that is made beside the steps.
+const STALE: u32 = 6;
 /// Turns smaller than this (rad, squared) leave the factor as it is.
 const FRAME_THRESHOLD: f64 = 0.05 * 0.05;
 
@@ -63,17 +66,23 @@ pub struct StepReport {
 
 /// Scratch of the solver; never saved. Allocates when made, then no more.
 pub(super) struct Workspace {
-    minimiser: Minimiser,
+    minimiser: Box<Minimiser>,
     /// The answer to every input, in scenes that are linear in them.
     table: Table,
     /// Which linearisation the minimiser's factor was made from.
     factored: Option<Arc<Linearisation>>,
+    /// The factor that the minimiser gets next.
+    ahead: Ahead,
     config: Configuration,
     /// Where the piece at hand started from.
     before: Configuration,
     motion: Motion,
     /// Estimated error in time of the last piece, m.
     time_error: f64,
+    /// The last accepted piece of time; its end is in `config`, what it remembered from before in `remembered`.
+    last: Option<Piece>,
+    /// Accepted pieces so far.
+    n_pieces: u64,
     /// What terms remember, and where the next memory is written.
     history: Vec<f64>,
     remembered: Vec<f64>,
@@ -82,6 +91,19 @@ pub(super) struct Workspace {
     pivots: Vec<Vec3>,
     u: Vec<Vec3>,
     wrenches: Vec<(Vec3, Vec3)>,
+}
+
+/// A piece of time that was accepted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Piece {
+    /// Its number, counted from the first of the workspace.
+    pub number: u64,
+    /// Its end, s.
+    pub t: f64,
+    /// Its length, s; 0 if no time passed.
+    pub dt: f64,
+    /// Length of the one before, s; 0 if there was none.
+    pub dt_before: f64,
 }
 
 /// Whether steps are read off a table.
@@ -108,13 +130,16 @@ impl Workspace {
             at: At { inputs: &parts.start, x_tilde: X, x_lag: X, ..At::NOWHERE },
         };
         Ok(Workspace {
-            minimiser: Minimiser::new(&problem, parts.strategy)?,
+            minimiser: Box::new(Minimiser::new(&problem, parts.strategy)?),
             table: Table::Unknown,
             factored: None,
+            ahead: Ahead::default(),
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             before: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             motion: Motion::still(X.len(), parts.inertia.as_ref()),
             time_error: 0.0,
+            last: None,
+            n_pieces: 0,
             history: vec![0.0; parts.n_history],
             remembered: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
@@ -128,14 +153,22 @@ impl Workspace {
     pub fn minimiser(&self) -> &Minimiser {
         &self.minimiser
     }
+
+    /// The piece of time that led to `state`, if that was the last one here, with what terms remembered before it and where
+    /// inertia alone would have carried the nodes.
+    pub fn piece_to(&self, state: &State) -> Option<(Piece, &[f64], &[Vec3])> {
+        let piece = self.last.filter(|piece| piece.t == state.t && self.config == state.config)?;
+        Some((piece, &self.remembered, &self.x_tilde))
+    }
 }
 
 /// Seeks the equilibrium at the start inputs, or checks that rest is where the scene starts.
-pub(super) fn initialise(model: &Model, state: &mut State, work: &mut Workspace) -> Result<StepReport, SimError> {
+pub(super) fn initialise(model: &Arc<Model>, state: &mut State, work: &mut Workspace) -> Result<StepReport, SimError> {
     if model.parts().inertia.as_ref().is_some_and(|i| i.start_at_rest) {
         check_inputs(model, &state.inputs)?;
         read_pivots(model, &state.inputs, &mut work.pivots);
         work.inputs.copy_from_slice(&state.inputs);
+        work.last = None;
         place_bones(model, &work.inputs, &mut work.config);
         if let Some(bone) = (0..model.parts().bones.len()).find(|&b| work.config.poses[b] != Pose::REST) {
             return Err(SimError::NotAtRest(model.parts().bones[bone].name.clone()));
@@ -168,7 +201,7 @@ fn set_off(model: &Model, state: &mut State, work: &mut Workspace) {
 
 /// Moves `state` on by `dt` seconds, or leaves it as it is; `watch` sees the state after each accepted piece but the last.
 pub(super) fn advance(
-    model: &Model,
+    model: &Arc<Model>,
     state: &mut State,
     work: &mut Workspace,
     dt: f64,
@@ -186,7 +219,7 @@ pub(super) fn advance(
     work.motion.copy_from(&state.motion);
     work.history.copy_from_slice(&state.history);
     let mut report = StepReport::new(0);
-    let mut linearisation = state.linearisation.clone();
+    let mut linearisation = take_up(model, state, work, &mut report);
     let pace = Pace::of(model.parts().inertia.as_ref()).filter(|_| dt > 0.0);
     let smallest = if pace.is_some() { Pace::SMALLEST } else { SMALLEST_PIECE };
     let (mut done, mut piece) = (0.0, 1.0);
@@ -254,7 +287,67 @@ pub(super) fn advance(
     state.t += dt;
     accept(model, state, work, &report, dt);
     state.linearisation = linearisation;
+    look_ahead(model, state, work, &report);
     Ok(report)
+}
+
+/// The linearisation that the step begins with: the upcoming one once its time has come, else the one at hand.
+fn take_up(
+    model: &Arc<Model>,
+    state: &State,
+    work: &mut Workspace,
+    report: &mut StepReport,
+) -> Option<Arc<Linearisation>> {
+    let Some(upcoming) = &state.upcoming else { return state.linearisation.clone() };
+    if upcoming.solves > 0 {
+        work.ahead.begin(model, &upcoming.linearisation);
+        return state.linearisation.clone();
+    }
+    let made = |factored: &Arc<Linearisation>| Arc::ptr_eq(factored, &upcoming.linearisation);
+    if !work.factored.as_ref().is_some_and(made) {
+        let Ok(minimiser) = work.ahead.finish(model, &upcoming.linearisation) else {
+            return state.linearisation.clone();
+        };
+        let before = std::mem::replace(&mut work.minimiser, minimiser);
+        work.ahead.keep(before);
+        work.factored = Some(upcoming.linearisation.clone());
+    }
+    report.factorisations += 1;
+    Some(upcoming.linearisation.clone())
+}
+
+/// Where a step has taken many solves, a new factor is begun at its end.
+fn look_ahead(model: &Arc<Model>, state: &mut State, work: &mut Workspace, report: &StepReport) {
+    if !model.parts().background || model.is_quadratic() || work.minimiser.factor_len() == 0 {
+        return;
+    }
+    let stale = report.iterations >= STALE * report.substeps;
+    state.upcoming = match (state.upcoming.take(), work.last) {
+        // One that was made within the step is newer, and one that was taken up is no longer to come.
+        (Some(_), _) if report.factorisations > 0 => None,
+        (Some(upcoming), _) => Some(Upcoming { solves: upcoming.solves.saturating_sub(report.iterations), ..upcoming }),
+        (None, Some(piece)) if stale => Some(Upcoming {
+            linearisation: Arc::new(Linearisation {
+                config: work.config.clone(),
+                t: piece.t,
+                dt: piece.dt,
+                dt_before: piece.dt_before,
+                inputs: work.inputs.clone(),
+                history: work.remembered.clone(),
+                x_tilde: work.x_tilde.clone(),
+            }),
+            solves: solves_of_a_factor(&work.minimiser),
+        }),
+        (None, _) => None,
+    };
+    if let Some(upcoming) = &state.upcoming {
+        work.ahead.begin(model, &upcoming.linearisation);
+    }
+}
+
+/// About how many solves, forces included, take as long as a factorisation: measured from 1k to 200k tetrahedra.
+fn solves_of_a_factor(minimiser: &Minimiser) -> u32 {
+    (0.15 * minimiser.factor_len() as f64 / minimiser.n_unknowns() as f64).ceil() as u32
 }
 
 /// Takes over where `work` has come to.
@@ -277,7 +370,7 @@ fn halfway(model: &Model, state: &State, work: &Workspace, report: &StepReport, 
 /// A step on which nothing acts: an equilibrium stays where it is while its inputs do.
 fn hold(model: &Model, state: &mut State, dt: f64) -> Option<StepReport> {
     let settled = state.outputs.converged && (state.linearisation.is_some() || state.partial);
-    if !(dt > 0.0 && settled && model.has_derivatives() && state.inputs == state.applied) {
+    if !(dt > 0.0 && settled && !model.remembers() && state.inputs == state.applied) {
         return None;
     }
     let mut report = StepReport::new(1);
@@ -405,6 +498,8 @@ fn step_piece(
         before,
         motion,
         time_error,
+        last,
+        n_pieces,
         history,
         remembered,
         inputs,
@@ -414,6 +509,7 @@ fn step_piece(
         wrenches,
         ..
     } = work;
+    *last = None;
     let at = At { t, dt, inputs, history, ..At::NOWHERE };
     let is_inverted = |x: &[Vec3]| min_det_f(model, x) <= 0.0;
     // A start that no step has led to may be tangled.
@@ -493,6 +589,8 @@ fn step_piece(
         parts.terms.iter().filter(|t| t.remembers()).for_each(|t| t.commit(&at, &config.x, remembered));
         std::mem::swap(history, remembered);
     }
+    *n_pieces += 1;
+    *last = Some(Piece { number: *n_pieces, t, dt, dt_before: motion.dt });
     if let Some((_, formula)) = &formula {
         motion.arrive(formula, dt, dofs, before, config);
     }
@@ -500,7 +598,7 @@ fn step_piece(
 }
 
 /// `at` with the coefficients of the scene's scheme, after a piece of `dt_before`.
-fn in_time<'a>(model: &Model, at: At<'a>, dt_before: f64) -> At<'a> {
+pub(super) fn in_time<'a>(model: &Model, at: At<'a>, dt_before: f64) -> At<'a> {
     match &model.parts().inertia {
         Some(i) if at.dt > 0.0 => At {
             inertia: i.scheme.formula(at.dt, dt_before).coefficient(i.damping_mass),
@@ -508,6 +606,14 @@ fn in_time<'a>(model: &Model, at: At<'a>, dt_before: f64) -> At<'a> {
             ..at
         },
         _ => at,
+    }
+}
+
+impl Linearisation {
+    /// What terms saw when it was made.
+    pub(super) fn at(&self, model: &Model) -> At<'_> {
+        let Linearisation { t, dt, inputs, history, x_tilde, .. } = self;
+        in_time(model, At { t: *t, dt: *dt, inputs, history, x_tilde, ..At::NOWHERE }, self.dt_before)
     }
 }
 
@@ -524,7 +630,6 @@ fn restore_factor(
     report: &mut StepReport,
 ) -> Result<(), SolveError> {
     let dt = problem.at.dt;
-    let as_made = |l: &Linearisation| in_time(model, At { dt: l.dt, ..At::NOWHERE }, l.dt_before);
     let near = |a: f64, b: f64| a == b || a != 0.0 && b != 0.0 && (a / b).ln().abs() <= DT_DRIFT;
     // Tunable moduli come first among the inputs; a stiffness that is never made anew must be of these very ones.
     let tunable = 0..model.parts().tunable.len();
@@ -535,20 +640,13 @@ fn restore_factor(
     let serves = |l: &Linearisation| {
         as_stiff(l)
             && (model.parts().inertia.is_none() && model.parts().n_history == 0
-                || near(l.dt, dt) && near(as_made(l).inertia.sqrt(), problem.at.inertia.sqrt()))
+                || near(l.dt, dt) && near(l.at(model).inertia.sqrt(), problem.at.inertia.sqrt()))
     };
     if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
         let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
         if !(same && minimiser.is_factored()) {
-            let at = At {
-                t: wanted.t,
-                inputs: &wanted.inputs,
-                history: &wanted.history,
-                x_tilde: &wanted.x_tilde,
-                ..as_made(wanted)
-            };
             *factored = None;
-            minimiser.linearise(&Problem { at, ..*problem }, &wanted.config)?;
+            minimiser.linearise(&Problem { at: wanted.at(model), ..*problem }, &wanted.config)?;
             *factored = Some(wanted.clone());
         }
         return Ok(());

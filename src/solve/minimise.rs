@@ -126,6 +126,11 @@ impl Minimiser {
         self.solver.factor_len()
     }
 
+    /// Scalar unknowns.
+    pub fn n_unknowns(&self) -> usize {
+        3 * self.g.len()
+    }
+
     /// Bytes of the matrices, the factor and the vectors.
     pub fn memory(&self) -> usize {
         let vectors = 2 * self.nodal.len() * 2 + self.g.len() * (3 + 2 * self.strategy.memory);

@@ -1,4 +1,4 @@
-//! Directional derivatives against differences of whole equilibria, and their linearity.
+//! Directional derivatives against differences of whole steps, and their linearity.
 
 use cutis::sim::Sim;
 
@@ -10,11 +10,20 @@ const SCENE: &str = "[mesh.block]\nsize = [0.06, 0.04, 0.02]\ncells = [6, 4, 2]\
     [[load]]\nname = \"push\"\nat = [0.03, 0.02, 0.02]\nradius = 0.01\n[[pressure]]\nname = \"air\"\n[gravity]\n[[marker]]\n\
     name = \"mid\"\nat = [0.03, 0.02, 0.02]\n[solver]\nmethod = \"newton\"\ntolerance = 1e-12\n";
 
-const OUT: [&str; 4] = ["skin.position", "marker.position", "bone.reactionForce", "bone.reactionTorque"];
+const OUT: [&str; 5] =
+    ["skin.position", "skin.velocity", "marker.position", "bone.reactionForce", "bone.reactionTorque"];
+
+/// Tissue that remembers, on the keys of `[[tissue]]`.
+const MEMORY: &str = "[[tissue]]\nviscous = { g = [0.4], tau = [0.05] }\ndamage = { onset = 20.0, scale = 200.0 }";
+
+/// Those of the outputs that the model has.
+fn outputs(sim: &Sim) -> Vec<&'static str> {
+    OUT.into_iter().filter(|name| sim.model().ports().iter().any(|p| p.name == *name)).collect()
+}
 
 fn derivative(sim: &mut Sim, input: &str, seed: &[f64]) -> Vec<Vec<f64>> {
     let known = port(sim, input);
-    let outputs = OUT.map(|name| port(sim, name));
+    let outputs: Vec<usize> = outputs(sim).iter().map(|name| port(sim, name)).collect();
     let n: Vec<usize> = outputs.iter().map(|&p| sim.model().ports()[p].len()).collect();
     let mut all = vec![0.0; n.iter().sum()];
     sim.directional_derivative(&[known], seed, &outputs, &mut all).expect("a derivative");
@@ -28,25 +37,35 @@ fn derivative(sim: &mut Sim, input: &str, seed: &[f64]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn compare(drive: &str, cases: &[(&str, Vec<f64>)], settle: impl Fn(&mut Sim)) {
-    let mut sim = sim(&SCENE.replace("DRIVE", drive));
+/// A step of `dt` after `settle` has led up to it and set its inputs.
+fn compare(scene: &str, dt: f64, cases: &[(&str, Vec<f64>)], settle: impl Fn(&mut Sim)) {
+    compare_but_for(1.0, scene, dt, cases, settle);
+}
+
+/// The same with all derivatives off by a factor.
+fn compare_but_for(planted: f64, scene: &str, dt: f64, cases: &[(&str, Vec<f64>)], settle: impl Fn(&mut Sim)) {
+    let mut sim = sim(scene);
     settle(&mut sim);
-    sim.step(1.0).expect("a bent state");
-    let state = sim.save();
+    let before = sim.save();
+    let names = outputs(&sim);
     for (input, seed) in cases {
+        sim.restore(&before).expect("its own state");
+        sim.step(dt).expect("a bent state");
+        let state = sim.save();
         let analytic = derivative(&mut sim, input, seed);
         let twice = derivative(&mut sim, input, &seed.iter().map(|s| -2.0 * s).collect::<Vec<_>>());
+        assert_eq!(sim.save(), state, "asking changes nothing");
         let start = get(&sim, input);
         let h = 2e-6 / seed.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
         let [plus, minus] = [h, -h].map(|h| {
-            sim.restore(&state).expect("its own state");
+            sim.restore(&before).expect("its own state");
             let moved: Vec<f64> = start.iter().zip(seed).map(|(v, s)| v + h * s).collect();
             set(&mut sim, input, 0, &moved);
-            sim.step(1.0).expect("nearby");
-            OUT.map(|name| get(&sim, name))
+            let report = sim.step(dt).expect("nearby");
+            assert_eq!(report.substeps, 1, "the derivative is that of a whole step");
+            names.iter().map(|name| get(&sim, name)).collect::<Vec<_>>()
         });
-        sim.restore(&state).expect("its own state");
-        for (k, name) in OUT.iter().enumerate() {
+        for (k, name) in names.iter().enumerate() {
             let scale = analytic[k].iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             if scale < 1e-8 {
                 continue; // what holds a driven bone does not change
@@ -54,20 +73,20 @@ fn compare(drive: &str, cases: &[(&str, Vec<f64>)], settle: impl Fn(&mut Sim)) {
             for (i, a) in analytic[k].iter().enumerate() {
                 let difference = (plus[k][i] - minus[k][i]) / (2.0 * h);
                 assert!(
-                    (a - difference).abs() < 1e-4 * scale,
+                    (planted * a - difference).abs() < 1e-4 * scale,
                     "d {name}[{i}] / d {input}: {a:.6e}, difference {difference:.6e}"
                 );
                 assert!((twice[k][i] + 2.0 * a).abs() < 1e-6 * scale, "d {name}[{i}] / d {input} is not linear");
             }
         }
     }
-    assert_eq!(sim.save(), state, "asking changes nothing");
 }
 
 #[test]
 fn derivatives_meet_differences_of_equilibria() {
     compare(
-        "",
+        &SCENE.replace("DRIVE", ""),
+        1.0,
         &[
             ("bone.translation", vec![0.0, 0.0, 0.0, 0.3, -0.5, 1.0]),
             ("bone.rotation", vec![0.0, 0.0, 0.0, 1.0, -0.4, 0.2]),
@@ -89,7 +108,8 @@ fn derivatives_meet_differences_of_equilibria() {
 #[test]
 fn derivatives_by_the_forces_on_a_bone_meet_differences_too() {
     compare(
-        "drive = \"force\"\n",
+        &SCENE.replace("DRIVE", "drive = \"force\"\n"),
+        1.0,
         &[("bone.force", vec![0.0, 0.0, 0.0, 0.1, 1.0, -0.3]), ("bone.torque", vec![0.0, 0.0, 0.0, 0.01, 0.02, -0.01])],
         |sim| {
             set(sim, "bone.force", 3, &[0.1, 0.02, -0.05]);
@@ -115,22 +135,87 @@ fn what_has_no_derivative_says_why() {
     assert!(message.contains("has derivatives"), "{message}");
     assert!(ask(&mut sim, known, &[f64::NAN, 0.0, 0.0], unknown).contains("not finite"));
     let mut dynamic = crate::common::sim(&format!("{}[inertia]\n", SCENE.replace("DRIVE", "")));
+    let (known, unknown) = (port(&dynamic, "gravity"), port(&dynamic, "marker.position"));
     dynamic.initialise().expect("equilibrium");
-    assert!(ask(&mut dynamic, known, &[1.0, 0.0, 0.0], unknown).contains("depends on the way"));
+    set(&mut dynamic, "gravity", 0, &[1.0, 0.0, 0.0]);
+    dynamic.step(0.01).expect("a step");
+    let state = dynamic.save();
+    dynamic.step(0.01).expect("a step");
+    dynamic.directional_derivative(&[known], &[1.0, 0.0, 0.0], &[unknown], &mut [0.0; 3]).expect("of that step");
+    dynamic.restore(&state).expect("its own state");
+    assert!(ask(&mut dynamic, known, &[1.0, 0.0, 0.0], unknown).contains("not known any more"));
+}
+
+/// Leads up to a step of 20 ms in the middle of a motion.
+fn swing(sim: &mut Sim) {
+    sim.initialise().expect("equilibrium");
+    for k in 1..4 {
+        let s = f64::from(k) / 4.0;
+        set(sim, "bone.translation", 3, &[0.003 * s, 0.001 * s, 0.002 * s]);
+        set(sim, "load.force", 0, &[0.0, 0.02 * s, -0.1 * s]);
+        sim.step(0.015).expect("a step");
+    }
+    bend(sim);
+}
+
+#[test]
+fn derivatives_of_steps_in_time_meet_differences() {
+    let cases = [
+        ("bone.translation", vec![0.0, 0.0, 0.0, 0.3, -0.5, 1.0]),
+        ("bone.rotation", vec![0.0, 0.0, 0.0, 1.0, -0.4, 0.2]),
+        ("load.force", vec![0.2, 0.1, -1.0]),
+        ("load.pressure", vec![1000.0]),
+        ("muscle.activation", vec![1.0]),
+        ("gravity", vec![1.0, 2.0, 3.0]),
+    ];
+    let plain = SCENE.replace("DRIVE", "");
+    let remembers = plain.replace("[[tissue]]", MEMORY);
+    compare(&remembers, 0.02, &cases, swing);
+    for scheme in ["backward-euler", "bdf2", "generalised-alpha"] {
+        let inertia = format!("[inertia]\nscheme = \"{scheme}\"\ndamping_mass = 3.0\ndamping_stiffness = 0.004\n");
+        compare(&format!("{plain}{inertia}"), 0.02, &cases, swing);
+        compare(&format!("{remembers}{inertia}"), 0.02, &cases, swing);
+    }
+}
+
+#[test]
+fn derivatives_of_steps_in_time_by_the_forces_on_a_bone_meet_differences() {
+    let scene = SCENE.replace("DRIVE", "drive = \"force\"\n") + "[inertia]\nscheme = \"bdf2\"\n";
+    let cases =
+        [("bone.force", vec![0.0, 0.0, 0.0, 0.1, 1.0, -0.3]), ("bone.torque", vec![0.0, 0.0, 0.0, 0.01, 0.02, -0.01])];
+    let push = |sim: &mut Sim| {
+        sim.initialise().expect("equilibrium");
+        set(sim, "bone.force", 3, &[0.1, 0.02, -0.05]);
+        sim.step(0.02).expect("a step");
+        set(sim, "bone.torque", 3, &[1e-4, 5e-4, -2e-4]);
+    };
+    compare(&scene, 0.01, &cases, push);
+}
+
+#[test]
+#[should_panic(expected = "difference")]
+fn planted_wrong_derivative_of_a_step_in_time_is_found() {
+    let scene = SCENE.replace("DRIVE", "") + "[inertia]\n";
+    compare_but_for(1.001, &scene, 0.02, &[("gravity", vec![1.0, 2.0, 3.0])], swing);
 }
 
 /// `<w, J v> = <J^T w, v>` for every output weighted and every input moved at once, and for each input alone.
 fn transposes(scene: &str, settle: impl Fn(&mut Sim)) {
-    transposes_but_for(1.0, scene, settle);
+    transposes_of_step(1.0, scene, settle);
+}
+
+/// The same in a step of `dt`.
+fn transposes_of_step(dt: f64, scene: &str, settle: impl Fn(&mut Sim)) {
+    transposes_but_for(1.0, dt, scene, settle);
 }
 
 /// The same with all adjoints off by a factor.
-fn transposes_but_for(planted: f64, scene: &str, settle: impl Fn(&mut Sim)) {
-    const CLOSE: f64 = 1e-7;
+fn transposes_but_for(planted: f64, dt: f64, scene: &str, settle: impl Fn(&mut Sim)) {
+    const CLOSE: f64 = 3e-7;
     let mut sim = sim(scene);
     sim.initialise().expect("equilibrium");
     settle(&mut sim);
-    sim.step(1.0).expect("a bent state");
+    sim.step(dt).expect("a bent state");
     let state = sim.save();
     let mut random = Random(11);
     let ports = sim.model().ports();
@@ -199,9 +284,23 @@ fn adjoint_is_the_transpose_with_bones_moved_by_pose() {
 }
 
 #[test]
+fn adjoint_is_the_transpose_in_steps_in_time() {
+    let scene = SCENE.replace("DRIVE", "").replace("[[tissue]]", MEMORY);
+    for inertia in ["", "[inertia]\nscheme = \"bdf2\"\ndamping_mass = 3.0\ndamping_stiffness = 0.004\n"] {
+        transposes_of_step(0.02, &format!("{scene}{inertia}"), bend);
+    }
+    let scene = SCENE.replace("DRIVE", "drive = \"force\"\n") + "[inertia]\nscheme = \"generalised-alpha\"\n";
+    transposes_of_step(0.02, &scene, |sim| {
+        set(sim, "bone.force", 3, &[0.1, 0.02, -0.05]);
+        set(sim, "bone.torque", 3, &[1e-4, 5e-4, -2e-4]);
+        set(sim, "load.pressure", 0, &[150.0]);
+    });
+}
+
+#[test]
 #[should_panic(expected = "<w, Jv>")]
 fn planted_wrong_adjoint_is_found() {
-    transposes_but_for(1.0 + 1e-6, &SCENE.replace("DRIVE", ""), bend);
+    transposes_but_for(1.0 + 1e-6, 1.0, &SCENE.replace("DRIVE", ""), bend);
 }
 
 #[test]
@@ -253,12 +352,13 @@ fn adjoint_meets_differences_of_equilibria() {
     bend(&mut sim);
     sim.step(1.0).expect("a bent state");
     let state = sim.save();
-    let outputs = OUT.map(|name| port(&sim, name));
+    let names = outputs(&sim);
+    let outputs: Vec<usize> = names.iter().map(|name| port(&sim, name)).collect();
     let mut random = Random(5);
     let w: Vec<Vec<f64>> =
-        OUT.iter().map(|name| (0..get(&sim, name).len()).map(|_| random.number()).collect()).collect();
+        names.iter().map(|name| (0..get(&sim, name).len()).map(|_| random.number()).collect()).collect();
     let loss = |sim: &Sim| -> f64 {
-        OUT.iter().zip(&w).map(|(name, w)| get(sim, name).iter().zip(w).map(|(y, w)| y * w).sum::<f64>()).sum()
+        names.iter().zip(&w).map(|(name, w)| get(sim, name).iter().zip(w).map(|(y, w)| y * w).sum::<f64>()).sum()
     };
     for (input, offset, h) in [
         ("bone.translation", 4, 1e-6),
