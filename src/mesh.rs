@@ -33,6 +33,15 @@ pub struct FineSkin {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// An order of elimination that was found before, so that it need not be found again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Elimination {
+    /// Hash of the matrix pattern that it was found for; it serves no other.
+    pub pattern: [u8; 32],
+    /// Blocks of unknowns, first eliminated first.
+    pub order: Vec<u32>,
+}
+
 /// Tetrahedra in rest position with everything a scene can refer to by name.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TetMesh {
@@ -50,6 +59,8 @@ pub struct TetMesh {
     pub face_sets: Vec<FaceSet>,
     /// The skin that hosts read instead of the face set [`SKIN`], if there is one.
     pub fine_skin: Option<FineSkin>,
+    /// What a scene of this mesh has been analysed to, if it has.
+    pub elimination: Option<Elimination>,
 }
 
 /// Why a mesh was refused.

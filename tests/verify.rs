@@ -11,6 +11,8 @@ mod common;
 mod compare;
 #[path = "verify/derivatives.rs"]
 mod derivatives;
+#[path = "verify/elimination.rs"]
+mod elimination;
 #[path = "verify/embedding.rs"]
 mod embedding;
 #[path = "verify/golden.rs"]

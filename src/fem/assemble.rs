@@ -1,23 +1,39 @@
 //! From the Hessian cliques of terms to the matrices of the unknowns.
 
 use super::{At, BlockMatrix, Configuration, CouplingMatrix, Curvature, Dofs, HessianSink, Pattern, Role, Term};
+use crate::math::lane::BATCH;
 use crate::math::{Mat3, Vec3};
 
 /// Where one block of a clique goes; found once, then read off in the same order at every assembly.
 #[derive(Debug, Clone, Copy)]
 enum Place {
-    /// Stored block of the unknowns.
-    Unknown(u32),
-    /// The same, transposed.
-    UnknownTransposed(u32),
-    /// Stored coupling block, row = the first node.
-    Coupling(u32),
-    /// The same, row = the second node.
-    CouplingTransposed(u32),
+    /// Among the unknowns.
+    Unknown(Stored),
+    /// In the coupling to prescribed nodes.
+    Coupling(Stored),
     /// Both nodes prescribed: nothing to store.
     Nowhere,
     /// At least one node rides on a rigid body.
     Rigid,
+}
+
+/// A stored block, and whether its row is the second node: then it takes the transpose.
+#[derive(Debug, Clone, Copy)]
+struct Stored {
+    k: u32,
+    turned: bool,
+}
+
+impl Stored {
+    fn new(k: Option<usize>, turned: bool) -> Stored {
+        Stored { k: k.expect("pattern holds every coupling") as u32, turned }
+    }
+
+    #[inline(always)]
+    fn add(self, blocks: &mut [Mat3], H: &Mat3) {
+        let to = &mut blocks[self.k as usize];
+        if self.turned { *to += H.transpose() } else { *to += H }
+    }
 }
 
 /// The Hessian of a sum of terms over the unknowns, and its coupling to the prescribed nodes.
@@ -50,13 +66,13 @@ impl Assembly {
         let K = BlockMatrix::zeros(Pattern::new(dofs.n_blocks(), unknown.into_iter()));
         let K_p = CouplingMatrix::new(dofs.n_blocks(), coupling.into_iter());
         let mut places = Vec::new();
-        let found = |k: Option<usize>| k.expect("pattern holds every coupling") as u32;
         each_pair(terms, |a, b| {
             places.push(match (dofs.role[a as usize], dofs.role[b as usize]) {
-                (Role::Free(i), Role::Free(j)) if i >= j => Place::Unknown(found(K.pattern.find(i, j))),
-                (Role::Free(i), Role::Free(j)) => Place::UnknownTransposed(found(K.pattern.find(j, i))),
-                (Role::Free(i), Role::Prescribed(p)) => Place::Coupling(found(K_p.find(i, p))),
-                (Role::Prescribed(p), Role::Free(j)) => Place::CouplingTransposed(found(K_p.find(j, p))),
+                (Role::Free(i), Role::Free(j)) => {
+                    Place::Unknown(Stored::new(K.pattern.find(i.max(j), i.min(j)), i < j))
+                }
+                (Role::Free(i), Role::Prescribed(p)) => Place::Coupling(Stored::new(K_p.find(i, p), false)),
+                (Role::Prescribed(p), Role::Free(j)) => Place::Coupling(Stored::new(K_p.find(j, p), true)),
                 (Role::Prescribed(_), Role::Prescribed(_)) => Place::Nowhere,
                 _ => Place::Rigid,
             });
@@ -136,6 +152,18 @@ impl HessianSink for Scatter<'_> {
             }
         }
     }
+    fn add_lane(&mut self, nodes: &[u32], upper: &[[[f64; BATCH]; 9]], lane: usize) {
+        let mut blocks = upper.iter();
+        let mut H = Mat3::zeros();
+        for (k, &a) in nodes.iter().enumerate() {
+            for (&b, entries) in nodes[k..].iter().zip(&mut blocks) {
+                for (h, entry) in H.as_mut_slice().iter_mut().zip(entries) {
+                    *h = entry[lane % BATCH];
+                }
+                self.add_block(a, b, &H);
+            }
+        }
+    }
     fn add_outer(&mut self, nodes: &[u32], c: &[Vec3], scale: f64) {
         for (k, &a) in nodes.iter().enumerate() {
             for (&b, c_b) in nodes[k..].iter().zip(&c[k..]) {
@@ -147,15 +175,14 @@ impl HessianSink for Scatter<'_> {
 
 impl Scatter<'_> {
     /// The next block of a clique.
+    #[inline(always)]
     fn add_block(&mut self, a: u32, b: u32, H: &Mat3) {
         let Assembly { K, K_p, places } = &mut *self.assembly;
         let place = places[self.cursor];
         self.cursor += 1;
         match place {
-            Place::Unknown(k) => K.blocks[k as usize] += H,
-            Place::UnknownTransposed(k) => K.blocks[k as usize] += H.transpose(),
-            Place::Coupling(k) => K_p.blocks[k as usize] += H,
-            Place::CouplingTransposed(k) => K_p.blocks[k as usize] += H.transpose(),
+            Place::Unknown(to) => to.add(&mut K.blocks, H),
+            Place::Coupling(to) => to.add(&mut K_p.blocks, H),
             Place::Nowhere => {}
             Place::Rigid => self.add_rigid(a, b, H),
         }

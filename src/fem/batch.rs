@@ -6,8 +6,8 @@ use super::solid::{Material, Point};
 use super::term::MAX_BLOCKS;
 use super::{At, HessianSink, Solid};
 use crate::energy::InvariantTangent;
+use crate::math::Vec3;
 use crate::math::lane::{BATCH, Lane, Real, Tensor, cofactors, det, dot3, tensor};
-use crate::math::{Mat3, Vec3};
 
 /// Shape gradients and weights of elements with N nodes and Q points, eight elements side by side. The gradient of the
 /// first node is minus the sum of the others'.
@@ -218,9 +218,8 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for AddHessian<'_, M,
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let AddHessian { solid, at, x, sink } = self;
-        // Blocks of a batch by entry, and those of one element.
+        // Blocks of a batch by entry.
         let mut blocks = [[[0.0; BATCH]; 9]; MAX_BLOCKS];
-        let mut upper = [Mat3::zeros(); MAX_BLOCKS];
         let n_blocks = N * (N + 1) / 2;
         let batches = solid.nodes.chunks(BATCH).zip(solid.points.values.chunks_exact(Q * Points::<N, Q>::LEN));
         for (nodes, points) in batches {
@@ -281,12 +280,7 @@ impl<M: Material, const N: usize, const Q: usize> WithSimd for AddHessian<'_, M,
                 }
             }
             for (lane, nodes) in nodes.iter().enumerate() {
-                for (upper, block) in upper[..n_blocks].iter_mut().zip(&blocks) {
-                    for (to, from) in upper.as_mut_slice().iter_mut().zip(block) {
-                        *to = from[lane];
-                    }
-                }
-                sink.add(nodes, &upper[..n_blocks]);
+                sink.add_lane(nodes, &blocks[..n_blocks], lane);
             }
         }
     }

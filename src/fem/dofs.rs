@@ -1,6 +1,7 @@
 //! Which nodes are unknown: free, prescribed, or carried by a force-driven rigid bone.
 
 use crate::math::{Mat3, Pose, Vec3, exp_rotation, skew};
+use crate::mesh::Elimination;
 
 /// What moves a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +36,8 @@ pub struct Dofs {
     pub prescribed: Vec<u32>,
     /// Force-driven bones.
     pub bodies: Vec<RigidBody>,
+    /// The order to eliminate them in, where it is known already.
+    pub elimination: Option<Elimination>,
 }
 
 /// Where everything is: node positions and bone poses.
@@ -78,7 +81,7 @@ impl Dofs {
             .enumerate()
             .map(|(b, (bone, nodes))| RigidBody { bone, nodes, block: (free.len() + 2 * b) as u32 })
             .collect();
-        Dofs { role, free, prescribed, bodies }
+        Dofs { role, free, prescribed, bodies, elimination: None }
     }
 
     /// Number of 3-vectors of unknowns.

@@ -1,5 +1,7 @@
 //! Sparse matrices of 3x3 blocks on a fixed pattern.
 
+use sha2::{Digest, Sha256};
+
 use crate::math::{Mat3, Vec3};
 
 /// Lower triangle of a symmetric block pattern, by columns: the diagonal block first, then rows in ascending order.
@@ -31,6 +33,13 @@ impl Pattern {
     /// Number of block columns.
     pub fn n(&self) -> usize {
         self.start.len() - 1
+    }
+
+    /// SHA-256 of its numbers: equal for equal patterns on every machine.
+    pub fn hash(&self) -> [u8; 32] {
+        let mut hash = Sha256::new();
+        self.start.iter().chain(&self.row).for_each(|k| hash.update(k.to_le_bytes()));
+        hash.finalize().into()
     }
 
     /// Index of the stored block at row `i` >= column `j`.

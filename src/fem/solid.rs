@@ -170,14 +170,23 @@ pub struct Solid<M, const N: usize, const Q: usize> {
 
 impl<M: Material, const N: usize, const Q: usize> Solid<M, N, Q> {
     /// The given elements of rest positions `X`; `points` makes the points of one element from its nodes' places.
+    ///
+    /// Nodes are kept in descending order, so that the upper blocks of an element's Hessian are lower ones of the matrix,
+    /// which stores these, and none has to be turned round.
     pub fn new(
         material: M,
         X: &[Vec3],
         elements: impl Iterator<Item = [u32; N]>,
         points: fn(&[Vec3; N]) -> [Point<N>; Q],
     ) -> Self {
-        let nodes: Vec<[u32; N]> = elements.collect();
-        let points = Points::new(nodes.iter().map(|n| points(&n.map(|a| X[a as usize]))));
+        let mut nodes: Vec<[u32; N]> = elements.collect();
+        let points = Points::new(nodes.iter_mut().map(|nodes| {
+            let points = points(&nodes.map(|a| X[a as usize]));
+            let mut order: [usize; N] = std::array::from_fn(|a| a);
+            order.sort_unstable_by_key(|&a| std::cmp::Reverse(nodes[a]));
+            *nodes = order.map(|a| nodes[a]);
+            points.map(|p| Point { dN: order.map(|a| p.dN[a]), w: p.w })
+        }));
         Solid { material, nodes, points }
     }
 }

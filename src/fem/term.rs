@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::Difference;
+use crate::math::lane::BATCH;
 use crate::math::{Mat3, Vec3};
 
 /// Everything a term sees besides the positions it is evaluated at.
@@ -78,6 +79,15 @@ impl Strain {
 pub trait HessianSink {
     /// Adds the upper triangle of blocks of `nodes`, row by row: (0,0), (0,1), ... (1,1), (1,2), ...
     fn add(&mut self, nodes: &[u32], upper: &[Mat3]);
+
+    /// The same for one of eight cliques side by side, whose blocks are given by their entries, column after column.
+    fn add_lane(&mut self, nodes: &[u32], upper: &[[[f64; BATCH]; 9]], lane: usize) {
+        let mut blocks = [Mat3::zeros(); MAX_BLOCKS];
+        for (to, from) in blocks.iter_mut().zip(upper) {
+            *to = Mat3::from_fn(|i, j| from[i + 3 * j][lane]);
+        }
+        self.add(nodes, &blocks[..upper.len()]);
+    }
 
     /// Adds `scale c_a c_b^T` for every two of `nodes`: one clique, however many they are.
     fn add_outer(&mut self, nodes: &[u32], c: &[Vec3], scale: f64);

@@ -97,6 +97,7 @@ pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
         nodes: stuffed.nodes,
         tets: stuffed.tets,
         fine_skin: None,
+        elimination: None,
     };
     Assembled { mesh, slit_nodes, released_nodes }
 }

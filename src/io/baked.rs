@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::IoError;
 use crate::math::Vec3;
-use crate::mesh::{FaceSet, NodeSet, TetMesh};
+use crate::mesh::{Elimination, FaceSet, NodeSet, TetMesh};
 
 const MAGIC: [u8; 8] = *b"cutis\r\n\x1a";
 /// Format written, and the newest that is read.
@@ -46,6 +46,12 @@ pub fn encode(mesh: &TetMesh) -> Vec<u8> {
             skin.vertices.iter().flat_map(|x| x.iter()).for_each(|c| out.extend(c.to_le_bytes()));
         });
         section(&mut payload, b"SKNT", |out| put_u32(out, skin.triangles.as_flattened()));
+    }
+    if let Some(elimination) = &mesh.elimination {
+        section(&mut payload, b"ORDR", |out| {
+            out.extend(elimination.pattern);
+            put_u32(out, &elimination.order);
+        });
     }
     let mut out = Vec::with_capacity(HEADER + payload.len());
     out.extend(MAGIC);
@@ -138,6 +144,12 @@ fn sections(payload: &[u8], path: &Path) -> Result<TetMesh, IoError> {
             b"SKNT" => {
                 let triangles = content.rows::<12>("SKNT")?.chunks_exact(12).map(numbers).collect();
                 mesh.fine_skin.get_or_insert_default().triangles = triangles;
+            }
+            b"ORDR" => {
+                let mut pattern = [0; 32];
+                pattern.copy_from_slice(content.take(32)?);
+                let order = content.rows::<4>("ORDR")?.chunks_exact(4).map(|b| numbers::<1>(b)[0]).collect();
+                mesh.elimination = Some(Elimination { pattern, order });
             }
             _ => {}
         }

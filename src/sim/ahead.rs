@@ -83,23 +83,31 @@ impl Drop for Ahead {
 
 /// Factors the stiffness of `l`, in `spare` if there is one.
 fn make(model: &Model, l: &Linearisation, spare: Option<Box<Minimiser>>) -> Made {
-    let parts = model.parts();
-    let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
-    read_pivots(model, &l.inputs, &mut pivots);
-    let mut wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
-    read_wrenches(model, &l.inputs, &mut wrenches);
-    let problem = Problem {
-        terms: &parts.terms,
-        dofs: model.dofs(),
-        X: &parts.mesh.nodes,
-        pivots: &pivots,
-        wrenches: &wrenches,
-        at: l.at(model),
-    };
-    let mut minimiser = match spare {
-        Some(spare) => spare,
-        None => Box::new(Minimiser::new(&problem, parts.strategy)?),
-    };
-    minimiser.linearise(&problem, &l.config)?;
-    Ok(minimiser)
+    l.with_problem(model, |problem| {
+        let mut minimiser = match spare {
+            Some(spare) => spare,
+            None => Box::new(Minimiser::new(problem, model.parts().strategy)?),
+        };
+        minimiser.linearise(problem, &l.config)?;
+        Ok(minimiser)
+    })
+}
+
+impl Linearisation {
+    /// What was minimised when it was made.
+    pub(super) fn with_problem<R>(&self, model: &Model, body: impl FnOnce(&Problem) -> R) -> R {
+        let parts = model.parts();
+        let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
+        read_pivots(model, &self.inputs, &mut pivots);
+        let mut wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
+        read_wrenches(model, &self.inputs, &mut wrenches);
+        body(&Problem {
+            terms: &parts.terms,
+            dofs: model.dofs(),
+            X: &parts.mesh.nodes,
+            pivots: &pivots,
+            wrenches: &wrenches,
+            at: self.at(model),
+        })
+    }
 }

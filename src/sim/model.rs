@@ -164,7 +164,8 @@ impl Model {
         prescribed.sort_unstable();
         let rigid = parts.bones.iter().enumerate().filter(|(_, b)| b.drive == Drive::Force);
         let rigid = rigid.map(|(k, b)| (k, b.nodes.clone())).collect();
-        let dofs = Dofs::new(parts.mesh.nodes.len(), prescribed, rigid);
+        let mut dofs = Dofs::new(parts.mesh.nodes.len(), prescribed, rigid);
+        dofs.elimination = parts.mesh.elimination.take();
         if parts.inertia.is_none() {
             check_held(&parts, &dofs)?;
         }

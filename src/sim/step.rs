@@ -646,7 +646,7 @@ fn restore_factor(
         let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
         if !(same && minimiser.is_factored()) {
             *factored = None;
-            minimiser.linearise(&Problem { at: wanted.at(model), ..*problem }, &wanted.config)?;
+            wanted.with_problem(model, |made| minimiser.linearise(made, &wanted.config))?;
             *factored = Some(wanted.clone());
         }
         return Ok(());

@@ -2,26 +2,28 @@
 
 use super::{Cholesky, Gradients, LinearSolver, LinearSystems, MOST_ENTRIES, Precision, SolveError};
 use crate::fem::Pattern;
+use crate::mesh::Elimination;
 
 /// Blocks beyond which a factor is not even analysed: no mesh of that size has one that is small.
 const MOST_ORDERED: usize = 300_000;
 /// Entries of a factor (12 bytes each in both precisions) beyond which the iterative solver is taken.
 const LARGE_FACTOR: usize = 400_000_000;
 
-/// The solver of a pattern: the direct one where its factor fits, else the iterative one.
+/// The solver of a pattern, whose order of elimination may be known: the direct one where its factor fits, else the iterative one.
 ///
 /// # Errors
 /// [`SolveError::TooLarge`] where the direct one is wanted and its factor would not fit.
 pub(super) fn choose(
     pattern: &Pattern,
+    known: Option<&Elimination>,
     precision: Precision,
     linear: LinearSystems,
 ) -> Result<Box<dyn LinearSolver>, SolveError> {
     match linear {
         LinearSystems::Iterative => Ok(Box::new(Gradients::new(pattern))),
-        LinearSystems::Direct => Ok(Box::new(Cholesky::analyse(pattern, precision, MOST_ENTRIES)?)),
+        LinearSystems::Direct => Ok(Box::new(Cholesky::analyse(pattern, known, precision, MOST_ENTRIES)?)),
         LinearSystems::Fitting if pattern.n() > MOST_ORDERED => Ok(Box::new(Gradients::new(pattern))),
-        LinearSystems::Fitting => match Cholesky::analyse(pattern, precision, LARGE_FACTOR) {
+        LinearSystems::Fitting => match Cholesky::analyse(pattern, known, precision, LARGE_FACTOR) {
             Ok(cholesky) => Ok(Box::new(cholesky)),
             Err(SolveError::TooLarge { .. }) => Ok(Box::new(Gradients::new(pattern))),
             Err(e) => Err(e),

@@ -11,9 +11,10 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
 use super::panels::Panels;
-use super::{LinearSolver, Precision, SolveError, nested_dissection};
+use super::{LinearSolver, Precision, SolveError, elimination};
 use crate::fem::{BlockMatrix, Pattern};
 use crate::math::Vec3;
+use crate::mesh::Elimination;
 
 /// Most entries of a factor: 12 GB of numbers.
 pub const MOST_ENTRIES: usize = 1_500_000_000;
@@ -32,14 +33,19 @@ pub struct Cholesky {
 }
 
 impl Cholesky {
-    /// Orders and analyses the pattern, and allocates everything later calls need.
+    /// Orders the pattern unless its order is `known`, analyses it, and allocates everything later calls need.
     ///
     /// # Errors
     /// [`SolveError::TooLarge`] for a factor of more entries than `limit`.
-    pub fn analyse(pattern: &Pattern, precision: Precision, limit: usize) -> Result<Cholesky, SolveError> {
+    pub fn analyse(
+        pattern: &Pattern,
+        known: Option<&Elimination>,
+        precision: Precision,
+        limit: usize,
+    ) -> Result<Cholesky, SolveError> {
         let n = 3 * pattern.n();
         let scalar = scalar_pattern(pattern);
-        let order = nested_dissection(pattern).map(|blocks| {
+        let order = elimination(pattern, known).map(|blocks| {
             let new_to_old: Vec<u32> = blocks.iter().flat_map(|b| [3 * b, 3 * b + 1, 3 * b + 2]).collect();
             let mut old_to_new = vec![0u32; n];
             for (new, &old) in new_to_old.iter().enumerate() {
@@ -209,7 +215,7 @@ mod tests {
         let x: Vec<Vec3> = (0..n).map(|i| Vec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
         let mut b = vec![Vec3::zeros(); n];
         A.multiply(&x, &mut b);
-        let mut solver = Cholesky::analyse(&A.pattern, Precision::Double, MOST_ENTRIES).expect("a small system");
+        let mut solver = Cholesky::analyse(&A.pattern, None, Precision::Double, MOST_ENTRIES).expect("a small system");
         solver.factor(&A).expect("diagonally dominant");
         solver.solve(&mut b);
         assert!(x.iter().zip(&b).all(|(x, b)| (x - b).norm() < 1e-10));
@@ -224,7 +230,8 @@ mod tests {
             let x: Vec<Vec3> = (0..n).map(|i| scale * Vec3::new((i as f64).sin(), 1.0, -0.5)).collect();
             let mut b = vec![Vec3::zeros(); n];
             A.multiply(&x, &mut b);
-            let mut solver = Cholesky::analyse(&A.pattern, Precision::Single, MOST_ENTRIES).expect("a small system");
+            let mut solver =
+                Cholesky::analyse(&A.pattern, None, Precision::Single, MOST_ENTRIES).expect("a small system");
             solver.factor(&A).expect("diagonally dominant");
             let mut again = b.clone();
             solver.solve(&mut again);

@@ -90,7 +90,8 @@ impl Minimiser {
     /// [`SolveError::TooLarge`].
     pub fn new(problem: &Problem, mut strategy: Strategy) -> Result<Minimiser, SolveError> {
         let assembly = Assembly::new(problem.terms, problem.dofs);
-        let solver = choose(&assembly.K.pattern, strategy.precision, strategy.linear)?;
+        let solver =
+            choose(&assembly.K.pattern, problem.dofs.elimination.as_ref(), strategy.precision, strategy.linear)?;
         if solver.factor_len() == 0 {
             // A solve by iteration costs about as much with a new matrix as with an old one: Newton's method.
             (strategy.memory, strategy.refresh_after) = (0, 1);

@@ -16,7 +16,7 @@ mod rung;
 pub use cholesky::{Cholesky, MOST_ENTRIES};
 pub use gradients::Gradients;
 pub use minimise::{Minimiser, Outcome, Strategy};
-pub use ordering::nested_dissection;
+pub use ordering::{elimination, nested_dissection};
 pub use problem::Problem;
 pub use rung::Rung;
 

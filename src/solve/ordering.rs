@@ -4,6 +4,16 @@
 //! multilevel bisection is the crate feral-metis, after Karypis & Kumar, SIAM J. Sci. Comput. 20(1), 1998.
 
 use crate::fem::Pattern;
+use crate::mesh::Elimination;
+
+/// New-to-old order of the blocks: the `known` one if it is of this pattern, else [`nested_dissection`].
+pub fn elimination(pattern: &Pattern, known: Option<&Elimination>) -> Option<Vec<u32>> {
+    let n = pattern.n();
+    match known {
+        Some(known) if is_permutation(&known.order, n) && known.pattern == pattern.hash() => Some(known.order.clone()),
+        _ => nested_dissection(pattern),
+    }
+}
 
 /// New-to-old order of the blocks, or `None` where the graph cannot be ordered (too large, or the library refuses):
 /// the caller then takes minimum degree.

@@ -90,6 +90,7 @@ pub fn shell(times: u32, layers: usize) -> TetMesh {
         nodes,
         tets,
         fine_skin: None,
+        elimination: None,
     }
     .checked()
     .expect("a shell")
