@@ -69,8 +69,9 @@ pub fn parts(size: &Size, law: &str) -> Result<Parts, Error> {
     let stiffness = median_time(LONG_ENOUGH, || problem.assemble(&mut assembly, &config, &nodal, Curvature::Exact));
     problem.assemble(&mut assembly, &config, &nodal, Curvature::Projected);
     let mut analysed = None;
-    let analysis =
-        median_time(0.0, || analysed = Some(Cholesky::analyse(&assembly.K.pattern, Precision::Single, MOST_ENTRIES)));
+    let analysis = median_time(0.0, || {
+        analysed = Some(Cholesky::analyse(&assembly.K.pattern, Precision::Single, 1, MOST_ENTRIES))
+    });
     let mut cholesky = analysed.expect("ran at least once").map_err(SimError::from)?;
     let mut found = Ok(());
     let factor = median_time(LONG_ENOUGH, || found = cholesky.factor(&assembly.K));

@@ -15,13 +15,14 @@ const LARGE_FACTOR: usize = 400_000_000;
 pub(super) fn choose(
     pattern: &Pattern,
     precision: Precision,
+    threads: usize,
     linear: LinearSystems,
 ) -> Result<Box<dyn LinearSolver>, SolveError> {
     match linear {
         LinearSystems::Iterative => Ok(Box::new(Gradients::new(pattern))),
-        LinearSystems::Direct => Ok(Box::new(Cholesky::analyse(pattern, precision, MOST_ENTRIES)?)),
+        LinearSystems::Direct => Ok(Box::new(Cholesky::analyse(pattern, precision, threads, MOST_ENTRIES)?)),
         LinearSystems::Fitting if pattern.n() > MOST_ORDERED => Ok(Box::new(Gradients::new(pattern))),
-        LinearSystems::Fitting => match Cholesky::analyse(pattern, precision, LARGE_FACTOR) {
+        LinearSystems::Fitting => match Cholesky::analyse(pattern, precision, threads, LARGE_FACTOR) {
             Ok(cholesky) => Ok(Box::new(cholesky)),
             Err(SolveError::TooLarge { .. }) => Ok(Box::new(Gradients::new(pattern))),
             Err(e) => Err(e),
