@@ -43,6 +43,8 @@ mod sensitivity;
 mod sphere;
 #[path = "verify/study.rs"]
 mod study;
+#[path = "verify/threads.rs"]
+mod threads;
 #[path = "verify/time.rs"]
 mod time;
 #[path = "verify/tissue.rs"]

@@ -70,7 +70,7 @@ pub fn parts(size: &Size, law: &str) -> Result<Parts, Error> {
     problem.assemble(&mut assembly, &config, &nodal, Curvature::Projected);
     let mut analysed = None;
     let analysis = median_time(0.0, || {
-        analysed = Some(Cholesky::analyse(&assembly.K.pattern, None, Precision::Single, MOST_ENTRIES))
+        analysed = Some(Cholesky::analyse(&assembly.K.pattern, None, Precision::Single, 1, MOST_ENTRIES))
     });
     let mut cholesky = analysed.expect("ran at least once").map_err(SimError::from)?;
     let mut found = Ok(());

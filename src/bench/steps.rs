@@ -1,6 +1,7 @@
 //! Steps of a scene: their time, and how far the skin is from where a solution to the last digits puts it.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use cpu_time::ThreadTime;
 
@@ -62,6 +63,28 @@ pub fn steps(scene: &Scene, size: &Size, checked: bool) -> Result<Steps, Error> 
         factorisations,
         error,
     })
+}
+
+/// Seconds by the clock that a step takes with one thread and with two, their medians, and the median of their ratios. Both
+/// simulations take each step in turn, once there and once back, so that what else the machine does meets both.
+///
+/// # Errors
+/// [`Error`] of a step that is refused; none as a rule.
+pub fn second_thread(scene: &Scene, size: &Size) -> Result<[f64; 3], Error> {
+    let text = |threads| scene.text(size, &format!("tolerance = {:e}\nthreads = {threads}\n", scene.tolerance));
+    let mut sims = [begin(&text(1))?, begin(&text(2))?];
+    let mut times = [Vec::new(), Vec::new()];
+    for k in (1..=scene.steps).chain((0..scene.steps).rev()) {
+        for (sim, times) in sims.iter_mut().zip(&mut times) {
+            pose(sim, scene, k)?;
+            let start = Instant::now();
+            sim.step(scene.dt)?;
+            times.push(start.elapsed().as_secs_f64());
+        }
+    }
+    let [one, two] = &mut times;
+    let mut ratios: Vec<f64> = one.iter().zip(&*two).map(|(one, two)| one / two).collect();
+    Ok([median(one), median(two), median(&mut ratios)])
 }
 
 /// Largest distance (m) of a vertex of the skin, seen after each step, from Newton's method to the last digits.

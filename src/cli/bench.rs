@@ -1,6 +1,6 @@
 //! `cutis bench`: the time of a step and of its parts, beside what this machine allows.
 
-use cutis::bench::{SCENES, SIZES, Size, bandwidth, parts, second_core, steps};
+use cutis::bench::{SCENES, SIZES, Size, bandwidth, parts, second_core, second_thread, steps};
 
 /// Bytes far beyond any cache.
 const IN_MEMORY: usize = 256 << 20;
@@ -8,6 +8,8 @@ const IN_MEMORY: usize = 256 << 20;
 const IN_CACHE: usize = 6 << 20;
 /// Law of the parts.
 const LAW: &str = "stable-neo-hookean";
+/// How the scenes are called that are timed with a second thread.
+const THREADED: &str = "advance";
 
 #[derive(clap::Args)]
 pub struct Bench {
@@ -40,6 +42,7 @@ impl Bench {
         }
         if !self.parts {
             self.table_of_steps(sizes)?;
+            self.table_of_threads(sizes)?;
         }
         Ok(())
     }
@@ -67,6 +70,21 @@ impl Bench {
         say!("");
         for scene in SCENES.iter().filter(|s| s.name.contains(wanted)) {
             say!("- `{}`: {}", scene.name, scene.what);
+        }
+        Ok(())
+    }
+
+    fn table_of_threads(&self, sizes: &[Size]) -> super::Done {
+        let wanted = self.scene.as_deref().unwrap_or_default();
+        say!("\nBy the clock, steps of two simulations in turn; medians, the last column that of the ratios.\n");
+        say!("| scene | tets | one thread ms | two threads ms | one by two |");
+        say!("| --- | --- | --- | --- | --- |");
+        for scene in SCENES.iter().filter(|s| s.name.starts_with(THREADED) && s.name.contains(wanted)) {
+            for size in sizes {
+                let [one, two, ratio] = second_thread(scene, size)?;
+                let n_tets = 6 * size.cells.iter().product::<usize>();
+                say!("| {} | {n_tets} | {:.3} | {:.3} | {ratio:.2} |", scene.name, 1e3 * one, 1e3 * two);
+            }
         }
         Ok(())
     }

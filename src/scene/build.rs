@@ -181,13 +181,10 @@ impl Builder<'_> {
         let spec = solver.as_ref();
         let newton =
             spec.map(|s| self.text.choice("solver", "method", &s.method)).transpose()?.flatten() == Some("newton");
-        let max_iterations = match spec.and_then(|s| s.max_iterations.as_ref()) {
-            Some(n) if *n.get_ref() < 1 => {
-                return Err(self.text.out_of_range("solver", "max_iterations", n, n.get_ref()));
-            }
-            Some(n) => *n.get_ref(),
-            None => 200,
-        };
+        let max_iterations = spec.and_then(|s| s.max_iterations.as_ref());
+        let max_iterations = max_iterations.map(|n| self.text.count("solver", "max_iterations", n)).transpose()?;
+        let threads = spec.and_then(|s| s.threads.as_ref());
+        let threads = threads.map(|n| self.text.count("solver", "threads", n)).transpose()?.unwrap_or(1);
         let inversion = spec.map(|s| self.text.choice("solver", "inversion", &s.inversion)).transpose()?.flatten();
         let precision = spec.map(|s| self.text.choice("solver", "precision", &s.precision)).transpose()?.flatten();
         let single = precision.map_or(!newton, |p| p == "single");
@@ -208,10 +205,11 @@ impl Builder<'_> {
                 _ => LinearSystems::Fitting,
             },
             precision: if single { Precision::Single } else { Precision::Double },
+            threads: threads as usize,
             memory: if newton { 0 } else { MEMORY },
             refresh_after: if newton { 1 } else { REFRESH_AFTER },
             tolerance,
-            max_iterations,
+            max_iterations: max_iterations.unwrap_or(200),
             without: None,
         };
         let model = Model::new(ModelParts {

@@ -54,6 +54,11 @@ impl Text<'_> {
         if find(table, name).range.holds(v) { Ok(v) } else { Err(self.out_of_range(table, name, value, &v)) }
     }
 
+    pub fn count(&self, table: &str, name: &str, value: &Spanned<u32>) -> Result<u32, SceneError> {
+        let n = *value.get_ref();
+        if find(table, name).range.holds(n.into()) { Ok(n) } else { Err(self.out_of_range(table, name, value, &n)) }
+    }
+
     pub fn number(&self, table: &str, name: &str, value: &Option<Spanned<f64>>) -> Result<Option<f64>, SceneError> {
         value.as_ref().map(|v| self.checked(table, name, v)).transpose()
     }

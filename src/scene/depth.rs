@@ -91,6 +91,7 @@ fn solve(mesh: &TetMesh, n: usize, skin: &[u32], bones: &BTreeSet<u32>) -> Resul
         max_iterations: 20,
         linear: LinearSystems::Fitting,
         precision: Precision::Double,
+        threads: 1,
         without: None,
     };
     let mut minimiser = Minimiser::new(&problem, strategy)?;

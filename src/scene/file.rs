@@ -307,6 +307,7 @@ pub struct SolverSpec {
     pub precision: Option<Spanned<String>>,
     pub linear: Option<Spanned<String>>,
     pub background: Option<Spanned<bool>>,
+    pub threads: Option<Spanned<u32>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

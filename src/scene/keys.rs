@@ -18,6 +18,8 @@ pub enum Range {
     OneOf(&'static [&'static str]),
     /// At least one.
     AtLeastOne,
+    /// One or two.
+    OneOrTwo,
 }
 
 impl Range {
@@ -29,6 +31,7 @@ impl Range {
                 Range::NonNegative => value >= 0.0,
                 Range::From(low, high) => (*low..*high).contains(&value),
                 Range::AtLeastOne => value >= 1.0,
+                Range::OneOrTwo => value == 1.0 || value == 2.0,
                 Range::Any | Range::OneOf(_) => true,
             }
     }
@@ -43,6 +46,7 @@ impl fmt::Display for Range {
             Range::From(low, high) if *high == 1.0 + f64::EPSILON => write!(f, "{low} <= . <= 1"),
             Range::From(low, high) => write!(f, "{low} <= . < {high}"),
             Range::AtLeastOne => write!(f, ">= 1"),
+            Range::OneOrTwo => write!(f, "1 or 2"),
             Range::OneOf(names) => {
                 for (k, name) in names.iter().enumerate() {
                     write!(f, "{}`\"{name}\"`", if k == 0 { "" } else { ", " })?;
@@ -84,7 +88,7 @@ const fn key(
     Key { table, name, kind, unit, range, default, doc }
 }
 
-use Range::{Any, AtLeastOne, From, NonNegative, OneOf, Positive};
+use Range::{Any, AtLeastOne, From, NonNegative, OneOf, OneOrTwo, Positive};
 
 /// Highest Poisson's ratio a linear tetrahedron is let near; above 0.45 it already locks.
 const NU_LIMIT: f64 = 0.5;
@@ -214,6 +218,7 @@ pub const KEYS: &[Key] = &[
     key("solver", "precision", "string", "", OneOf(&["single", "double"]), "by `method`", "Of the solves with a kept factor: `single` (for `quasi-newton`) takes half the time and leaves the accuracy to `tolerance`, `double` (for `newton`) saves an iteration where a scene is badly conditioned. Residuals and the factor are always in double precision."),
     key("solver", "linear", "string", "", OneOf(&["direct", "iterative"]), "`direct` where its factor fits", "`direct` keeps a factor, which serves many solves; `iterative` runs conjugate gradients in Newton's method, with memory in proportion to the mesh. Without the key factors of more than 400 million numbers are avoided."),
     key("solver", "background", "boolean", "", Any, "false", "A second thread makes the kept factor anew while steps go on, where a step took six solves or more: no step waits for a factorisation that was foreseen, and fewer solves are needed. Takes matrices and factor twice. The same bits each time, but not those of a scene without."),
+    key("solver", "threads", "integer", "", OneOrTwo, "1", "Threads of a simulation: a second one takes half of the solves in single precision off the first where a factor is large enough. The answer is the same to the bit; it pays in time on a core that is free."),
     key("run", "dt", "float", "s", Positive, "0.1", "Length of a step."),
     key("run", "end", "float", "s", Positive, "1", "End time."),
     key("keyframe", "t", "float", "s", NonNegative, "required", "Time."),

@@ -220,7 +220,7 @@ impl Sensitivity {
         };
         let mut minimiser = match before {
             Some(minimiser) => minimiser,
-            None => Minimiser::new(&problem, Strategy { memory: 0, ..parts.strategy })?,
+            None => Minimiser::new(&problem, Strategy { memory: 0, threads: 1, ..parts.strategy })?,
         };
         minimiser.linearise(&problem, &state.config)?;
         Ok(Sensitivity { minimiser, config: state.config.clone(), inputs: state.applied.clone(), past })

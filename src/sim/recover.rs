@@ -22,6 +22,7 @@ const STRATEGY: Strategy = Strategy {
     max_iterations: 500,
     linear: LinearSystems::Fitting,
     precision: Precision::Double,
+    threads: 1,
     without: None,
 };
 

@@ -1,6 +1,6 @@
 //! Which linear solver a scene gets.
 
-use super::{Cholesky, Gradients, LinearSolver, LinearSystems, MOST_ENTRIES, Precision, SolveError};
+use super::{Cholesky, Gradients, LinearSolver, LinearSystems, MOST_ENTRIES, SolveError, Strategy};
 use crate::fem::Pattern;
 use crate::mesh::Elimination;
 
@@ -16,14 +16,14 @@ const LARGE_FACTOR: usize = 400_000_000;
 pub(super) fn choose(
     pattern: &Pattern,
     known: Option<&Elimination>,
-    precision: Precision,
-    linear: LinearSystems,
+    strategy: &Strategy,
 ) -> Result<Box<dyn LinearSolver>, SolveError> {
-    match linear {
+    let Strategy { precision, threads, .. } = *strategy;
+    match strategy.linear {
         LinearSystems::Iterative => Ok(Box::new(Gradients::new(pattern))),
-        LinearSystems::Direct => Ok(Box::new(Cholesky::analyse(pattern, known, precision, MOST_ENTRIES)?)),
+        LinearSystems::Direct => Ok(Box::new(Cholesky::analyse(pattern, known, precision, threads, MOST_ENTRIES)?)),
         LinearSystems::Fitting if pattern.n() > MOST_ORDERED => Ok(Box::new(Gradients::new(pattern))),
-        LinearSystems::Fitting => match Cholesky::analyse(pattern, known, precision, LARGE_FACTOR) {
+        LinearSystems::Fitting => match Cholesky::analyse(pattern, known, precision, threads, LARGE_FACTOR) {
             Ok(cholesky) => Ok(Box::new(cholesky)),
             Err(SolveError::TooLarge { .. }) => Ok(Box::new(Gradients::new(pattern))),
             Err(e) => Err(e),

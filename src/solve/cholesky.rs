@@ -19,8 +19,9 @@ use crate::mesh::Elimination;
 /// Most entries of a factor: 12 GB of numbers.
 pub const MOST_ENTRIES: usize = 1_500_000_000;
 
-/// Supernodal Cholesky on one thread; the same bits whatever the machine's load. The factor is always made in double
-/// precision, so what is called positive definite does not depend on how it is solved with.
+/// Supernodal Cholesky on one thread, solved with on one or two; the same bits whatever their number and the machine's load.
+/// The factor is always made in double precision, so what is called positive definite does not depend on how it is solved
+/// with.
 pub struct Cholesky {
     scalar: SymbolicSparseColMat<u32>,
     values: Vec<f64>,
@@ -33,7 +34,8 @@ pub struct Cholesky {
 }
 
 impl Cholesky {
-    /// Orders the pattern unless its order is `known`, analyses it, and allocates everything later calls need.
+    /// Orders the pattern unless its order is `known`, analyses it, and allocates everything later calls need. With two
+    /// `threads` a second one helps to solve in single precision.
     ///
     /// # Errors
     /// [`SolveError::TooLarge`] for a factor of more entries than `limit`.
@@ -41,6 +43,7 @@ impl Cholesky {
         pattern: &Pattern,
         known: Option<&Elimination>,
         precision: Precision,
+        threads: usize,
         limit: usize,
     ) -> Result<Cholesky, SolveError> {
         let n = 3 * pattern.n();
@@ -72,7 +75,7 @@ impl Cholesky {
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
         );
         let panels = match symbolic.raw() {
-            SymbolicCholeskyRaw::Supernodal(raw) if precision == Precision::Single => Some(Panels::new(raw)),
+            SymbolicCholeskyRaw::Supernodal(raw) if precision == Precision::Single => Some(Panels::new(raw, threads)),
             _ => None,
         };
         Ok(Cholesky {
@@ -192,10 +195,10 @@ mod tests {
     use super::*;
     use crate::math::Mat3;
 
-    fn random_block_system(n: usize) -> BlockMatrix {
-        let edges = (1..n as u32).flat_map(|i| [(i, i - 1), (i, i / 3), (i, 31 % i)]);
-        let mut A = BlockMatrix::zeros(Pattern::new(n, edges));
-        for j in 0..n {
+    /// Noise on a pattern, with a diagonal that outweighs it.
+    fn noise(pattern: Pattern) -> BlockMatrix {
+        let mut A = BlockMatrix::zeros(pattern);
+        for j in 0..A.pattern.n() {
             for k in A.pattern.start[j] as usize..A.pattern.start[j + 1] as usize {
                 let noise = Mat3::from_fn(|r, c| ((7 * k + 3 * r + c) as f64).sin());
                 A.blocks[k] = if A.pattern.row[k] as usize == j {
@@ -208,6 +211,10 @@ mod tests {
         A
     }
 
+    fn random_block_system(n: usize) -> BlockMatrix {
+        noise(Pattern::new(n, (1..n as u32).flat_map(|i| [(i, i - 1), (i, i / 3), (i, 31 % i)])))
+    }
+
     #[test]
     fn solves_a_random_block_system() {
         let n = 40;
@@ -215,7 +222,8 @@ mod tests {
         let x: Vec<Vec3> = (0..n).map(|i| Vec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
         let mut b = vec![Vec3::zeros(); n];
         A.multiply(&x, &mut b);
-        let mut solver = Cholesky::analyse(&A.pattern, None, Precision::Double, MOST_ENTRIES).expect("a small system");
+        let mut solver =
+            Cholesky::analyse(&A.pattern, None, Precision::Double, 1, MOST_ENTRIES).expect("a small system");
         solver.factor(&A).expect("diagonally dominant");
         solver.solve(&mut b);
         assert!(x.iter().zip(&b).all(|(x, b)| (x - b).norm() < 1e-10));
@@ -231,7 +239,7 @@ mod tests {
             let mut b = vec![Vec3::zeros(); n];
             A.multiply(&x, &mut b);
             let mut solver =
-                Cholesky::analyse(&A.pattern, None, Precision::Single, MOST_ENTRIES).expect("a small system");
+                Cholesky::analyse(&A.pattern, None, Precision::Single, 1, MOST_ENTRIES).expect("a small system");
             solver.factor(&A).expect("diagonally dominant");
             let mut again = b.clone();
             solver.solve(&mut again);
@@ -242,5 +250,38 @@ mod tests {
             solver.solve(&mut none);
             assert!(none.iter().all(|b| *b == Vec3::zeros()));
         }
+    }
+    /// A stiffness on a lattice of n x n x n blocks.
+    fn lattice(n: u32) -> BlockMatrix {
+        let at = |i: u32, j: u32, k: u32| (i * n + j) * n + k;
+        let cells = (0..n * n * n).map(|a| [a / n / n, a / n % n, a % n]);
+        let edges = cells.flat_map(|[i, j, k]| {
+            let next = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 1, 1)]
+                .map(|(a, b, c)| (i + a, j + b, k + c));
+            next.into_iter().filter(|c| c.0.max(c.1).max(c.2) < n).map(move |c| (at(c.0, c.1, c.2), at(i, j, k)))
+        });
+        noise(Pattern::new((n * n * n) as usize, edges))
+    }
+
+    #[test]
+    fn two_threads_solve_to_the_bits_of_one() {
+        let A = lattice(12);
+        let x: Vec<Vec3> = (0..A.pattern.n()).map(|i| Vec3::new((i as f64).sin(), 1.0, -0.5)).collect();
+        let mut b = vec![Vec3::zeros(); x.len()];
+        A.multiply(&x, &mut b);
+        let found = [1, 2].map(|threads| {
+            let mut solver =
+                Cholesky::analyse(&A.pattern, None, Precision::Single, threads, MOST_ENTRIES).expect("small enough");
+            let panels = solver.panels.as_ref().expect("single precision");
+            assert_eq!(panels.n_threads(), threads, "a factor of {} numbers has halves", solver.factor_len());
+            [(); 3].map(|()| {
+                solver.factor(&A).expect("diagonally dominant");
+                let mut found = b.clone();
+                solver.solve(&mut found);
+                found
+            })
+        });
+        assert!(x.iter().zip(&found[0][0]).all(|(x, found)| (x - found).norm() < 1e-5));
+        assert!(found.iter().flatten().all(|f| *f == found[0][0]));
     }
 }

@@ -28,6 +28,8 @@ pub struct Strategy {
     pub linear: LinearSystems,
     /// Precision of the linear solves.
     pub precision: Precision,
+    /// Threads that solve, 1 or 2; the answer is the same.
+    pub threads: usize,
     /// A rung that is left out, to be measured.
     pub without: Option<Rung>,
 }
@@ -90,8 +92,7 @@ impl Minimiser {
     /// [`SolveError::TooLarge`].
     pub fn new(problem: &Problem, mut strategy: Strategy) -> Result<Minimiser, SolveError> {
         let assembly = Assembly::new(problem.terms, problem.dofs);
-        let solver =
-            choose(&assembly.K.pattern, problem.dofs.elimination.as_ref(), strategy.precision, strategy.linear)?;
+        let solver = choose(&assembly.K.pattern, problem.dofs.elimination.as_ref(), &strategy)?;
         if solver.factor_len() == 0 {
             // A solve by iteration costs about as much with a new matrix as with an old one: Newton's method.
             (strategy.memory, strategy.refresh_after) = (0, 1);

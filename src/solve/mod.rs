@@ -5,6 +5,7 @@
 mod choice;
 mod cholesky;
 mod gradients;
+mod halves;
 mod incomplete;
 mod lbfgs;
 mod minimise;
@@ -12,6 +13,8 @@ mod ordering;
 mod panels;
 mod problem;
 mod rung;
+mod sweep;
+mod worker;
 
 pub use cholesky::{Cholesky, MOST_ENTRIES};
 pub use gradients::Gradients;

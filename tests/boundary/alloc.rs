@@ -78,6 +78,23 @@ fn a_step_after_the_first_allocates_nothing() {
 }
 
 #[test]
+fn a_step_with_a_second_thread_allocates_nothing() {
+    let scene = "[mesh.block]\nsize = [0.1, 0.1, 0.04]\ncells = [17, 17, 6]\n[[tissue]]\nE = 15e3\nnu = 0.45\n[[bone]]\n\
+                 name = \"bone\"\nnodes = \"z_min\"\n[solver]\nthreads = 2\n";
+    let mut sim = Sim::new(Arc::new(cutis::load::from_text(scene, None).unwrap().model)).unwrap();
+    let rotation = sim.model().ports().iter().position(|p| p.name == "bone.rotation").unwrap();
+    sim.initialise().unwrap();
+    for k in 1..=4 {
+        sim.set_f64(rotation, 0, &[0.01 * f64::from(k), 0.0, 0.0]).unwrap();
+        let mut report = None;
+        let counted = allocations(|| report = Some(sim.step(0.1).unwrap()));
+        let report = report.unwrap();
+        assert!(report.iterations > 0 && report.factorisations == 0, "solves with the kept factor");
+        assert!(k == 1 || counted == 0, "step {k}: {counted} allocations");
+    }
+}
+
+#[test]
 fn a_dynamic_step_allocates_nothing_without_a_new_factor() {
     let scene = "[mesh.block]\nsize = [0.04, 0.02, 0.02]\ncells = [4, 2, 2]\n[[tissue]]\nE = 1e4\nnu = 0.4\n[[bone]]\n\
                  name = \"skull\"\nnodes = \"x_min\"\n[inertia]\nscheme = \"generalised-alpha\"\ndamping_mass = 1.0\n\

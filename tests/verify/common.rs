@@ -31,6 +31,14 @@ pub fn sim(scene: &str) -> Sim {
     Sim::new(Arc::new(loaded.model)).expect("a new simulation")
 }
 
+/// Why a scene is not taken.
+pub fn refused(scene: &str) -> String {
+    match cutis::load::from_text(scene, None) {
+        Ok(_) => panic!("accepted:\n{scene}"),
+        Err(e) => e.to_string(),
+    }
+}
+
 pub fn port(sim: &Sim, name: &str) -> usize {
     sim.model().ports().iter().position(|p| p.name == name).unwrap_or_else(|| panic!("no port {name}"))
 }

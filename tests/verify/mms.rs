@@ -156,6 +156,7 @@ fn errors<M: Energy + 'static>(law: fn() -> M, force: f64, order: u32, n: usize)
         max_iterations: 50,
         linear: LinearSystems::Direct,
         precision: Precision::Double,
+        threads: 1,
         without: None,
     };
     // The start is the motion at the nodes, where every law is defined; the equilibrium is near it and elsewhere.

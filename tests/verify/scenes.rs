@@ -4,17 +4,10 @@ use std::collections::BTreeSet;
 
 use cutis::scene::{KEYS, SceneFile, key_reference};
 
-use crate::common::{get, set, sim};
+use crate::common::{get, refused, set, sim};
 
 const GOOD: &str = "[mesh.block]\nsize = [0.04, 0.02, 0.02]\ncells = [4, 2, 2]\n[[tissue]]\nE = 1e4\nnu = 0.4\n\
                     [[bone]]\nname = \"skull\"\nnodes = \"x_min\"\n";
-
-fn refused(scene: &str) -> String {
-    match cutis::load::from_text(scene, None) {
-        Ok(_) => panic!("accepted:\n{scene}"),
-        Err(e) => e.to_string(),
-    }
-}
 
 #[test]
 fn a_bone_may_take_part_of_a_node_set() {
