@@ -35,7 +35,7 @@ pub struct Steps {
 /// [`Error`] of a step that is refused; none as a rule.
 pub fn steps(scene: &Scene, size: &Size, checked: bool) -> Result<Steps, Error> {
     let start = ThreadTime::now();
-    let mut sim = begin(&scene.text(size, &format!("tolerance = {:e}\n", scene.tolerance)))?;
+    let mut sim = begin(&scene.text(size, &format!("tolerance = {:e}\n", scene.tolerance), false))?;
     let setup = start.elapsed().as_secs_f64();
     let skin = port(&sim, Slot::SkinPosition);
     let mut seen = vec![vec![0.0; sim.model().ports()[skin].len()]; scene.steps];
@@ -66,7 +66,7 @@ pub fn steps(scene: &Scene, size: &Size, checked: bool) -> Result<Steps, Error> 
 
 /// Largest distance (m) of a vertex of the skin, seen after each step, from Newton's method to the last digits.
 fn worst(scene: &Scene, size: &Size, seen: &[Vec<f64>]) -> Result<f64, Error> {
-    let mut sim = begin(&scene.text(size, "method = \"newton\"\ntolerance = 1e-10\n"))?;
+    let mut sim = begin(&scene.text(size, "method = \"newton\"\ntolerance = 1e-10\n", true))?;
     let skin = port(&sim, Slot::SkinPosition);
     let mut truth = vec![0.0; sim.model().ports()[skin].len()];
     let mut error = 0.0_f64;
