@@ -31,6 +31,8 @@ mod loads;
 mod locking;
 #[path = "verify/mms.rs"]
 mod mms;
+#[path = "verify/modal.rs"]
+mod modal;
 #[path = "verify/patch.rs"]
 mod patch;
 #[path = "verify/rigid.rs"]

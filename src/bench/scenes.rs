@@ -35,6 +35,8 @@ pub struct Scene {
     pub pose: fn(k: usize) -> ([f64; 3], [f64; 3]),
     /// Whether every node is read after a step, not the skin alone.
     pub whole: bool,
+    /// Modes of vibration that it moves in; the tables then end with `[inertia]`.
+    pub modes: Option<u32>,
     /// Largest nodal motion of the last correction, m.
     pub tolerance: f64,
 }
@@ -65,7 +67,7 @@ fn turn(k: usize) -> ([f64; 3], [f64; 3]) {
 }
 
 /// What is measured.
-pub const SCENES: [Scene; 6] = [
+pub const SCENES: [Scene; 7] = [
     Scene {
         name: "advance",
         what: "equilibrium, stable neo-Hookean, nu 0.45, the jaw goes 1.1 mm a step",
@@ -74,6 +76,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 10,
         pose: advance,
         whole: false,
+        modes: None,
         tolerance: 3e-6,
     },
     Scene {
@@ -84,6 +87,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 10,
         pose: advance,
         whole: false,
+        modes: None,
         tolerance: 3e-6,
     },
     Scene {
@@ -94,6 +98,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 60,
         pose: shake,
         whole: false,
+        modes: None,
         tolerance: 3e-6,
     },
     Scene {
@@ -104,6 +109,7 @@ pub const SCENES: [Scene; 6] = [
         steps: 60,
         pose: turn,
         whole: true,
+        modes: None,
         tolerance: 3e-6,
     },
     Scene {
@@ -114,6 +120,18 @@ pub const SCENES: [Scene; 6] = [
         steps: 60,
         pose: turn,
         whole: false,
+        modes: None,
+        tolerance: 3e-6,
+    },
+    Scene {
+        name: "shake-modal",
+        what: "`shake` with linear tissue in 60 modes; off by what they leave out of all unknowns",
+        tables: || tissue("linear", 0.45) + SHAKEN,
+        dt: 1.0 / 60.0,
+        steps: 60,
+        pose: shake,
+        whole: false,
+        modes: Some(60),
         tolerance: 3e-6,
     },
     Scene {
@@ -124,15 +142,18 @@ pub const SCENES: [Scene; 6] = [
         steps: 10,
         pose: advance,
         whole: false,
+        modes: None,
         tolerance: 3e-6,
     },
 ];
 
 impl Scene {
-    /// The scene's text on a block of this size; `solver` goes into its table of that name.
-    pub fn text(&self, size: &Size, solver: &str) -> String {
+    /// The scene's text on a block of this size; `solver` goes into its table of that name, modes only where they are not to
+    /// be `checked` against all unknowns.
+    pub fn text(&self, size: &Size, solver: &str, checked: bool) -> String {
+        let modes = self.modes.filter(|_| !checked).map_or(String::new(), |n| format!("modes = {n}\n"));
         format!(
-            "{}[mesh.block]\nsize = [0.1, 0.1, 0.04]\ncells = {:?}\n[solver]\n{solver}",
+            "{}{modes}[mesh.block]\nsize = [0.1, 0.1, 0.04]\ncells = {:?}\n[solver]\n{solver}",
             (self.tables)(),
             size.cells
         )

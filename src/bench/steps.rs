@@ -36,7 +36,7 @@ pub struct Steps {
 /// [`Error`] of a step that is refused; none as a rule.
 pub fn steps(scene: &Scene, size: &Size, checked: bool) -> Result<Steps, Error> {
     let start = ThreadTime::now();
-    let mut sim = begin(&scene.text(size, &format!("tolerance = {:e}\n", scene.tolerance)))?;
+    let mut sim = begin(&scene.text(size, &format!("tolerance = {:e}\n", scene.tolerance), false))?;
     let setup = start.elapsed().as_secs_f64();
     let skin = port(&sim, Slot::SkinPosition);
     let mut seen = vec![vec![0.0; sim.model().ports()[skin].len()]; scene.steps];
@@ -71,7 +71,7 @@ pub fn steps(scene: &Scene, size: &Size, checked: bool) -> Result<Steps, Error> 
 /// # Errors
 /// [`Error`] of a step that is refused; none as a rule.
 pub fn second_thread(scene: &Scene, size: &Size) -> Result<[f64; 3], Error> {
-    let text = |threads| scene.text(size, &format!("tolerance = {:e}\nthreads = {threads}\n", scene.tolerance));
+    let text = |threads| scene.text(size, &format!("tolerance = {:e}\nthreads = {threads}\n", scene.tolerance), false);
     let mut sims = [begin(&text(1))?, begin(&text(2))?];
     let mut times = [Vec::new(), Vec::new()];
     for k in (1..=scene.steps).chain((0..scene.steps).rev()) {
@@ -89,7 +89,7 @@ pub fn second_thread(scene: &Scene, size: &Size) -> Result<[f64; 3], Error> {
 
 /// Largest distance (m) of a vertex of the skin, seen after each step, from Newton's method to the last digits.
 fn worst(scene: &Scene, size: &Size, seen: &[Vec<f64>]) -> Result<f64, Error> {
-    let mut sim = begin(&scene.text(size, "method = \"newton\"\ntolerance = 1e-10\n"))?;
+    let mut sim = begin(&scene.text(size, "method = \"newton\"\ntolerance = 1e-10\n", true))?;
     let skin = port(&sim, Slot::SkinPosition);
     let mut truth = vec![0.0; sim.model().ports()[skin].len()];
     let mut error = 0.0_f64;

@@ -1,8 +1,10 @@
 //! `cutis check`: what a scene holds.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use cutis::load;
+use cutis::sim::{Model, Sim};
 
 #[derive(clap::Args)]
 pub struct Check {
@@ -34,9 +36,25 @@ impl Check {
         for p in model.ports() {
             say!("{:>6}  {:<28} {:<12} {:<6} {:?}", p.reference, p.name, format!("{:?}", p.shape), p.unit, p.causality);
         }
-        for warning in model.warnings() {
+        let warnings = model.warnings().to_vec();
+        if model.is_reduced() {
+            tell_modes(loaded.model)?;
+        }
+        for warning in warnings {
             say!("warning: {warning}");
         }
         Ok(())
     }
+}
+
+/// What the modes of a scene hold, and what they leave out.
+fn tell_modes(model: Model) -> super::Done {
+    let Some(spectrum) = Sim::new(Arc::new(model))?.spectrum()? else { return Ok(()) };
+    let f = &spectrum.frequencies;
+    let (first, last) = (f.first().copied().unwrap_or(0.0), f.last().copied().unwrap_or(0.0));
+    let left_out = spectrum.left_out.map_or("none is left out".into(), |f| format!("the next one has {f:.2} Hz"));
+    let [x, y, z] = spectrum.mass_share.map(|s| 100.0 * s);
+    say!("{} modes from {first:.2} to {last:.2} Hz, {left_out}", f.len());
+    say!("  they move {x:.1}, {y:.1} and {z:.1} % of the free mass with bones along x, y and z");
+    Ok(())
 }

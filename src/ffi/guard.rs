@@ -21,7 +21,9 @@ pub(super) trait Guarded {
     fn poison(&mut self, why: String);
 }
 
-/// A value behind an opaque pointer.
+/// A value behind an opaque pointer. Its tag comes first whatever the value is, so that a handle of another kind can be told by
+/// it.
+#[repr(C)]
 pub struct Handle<T> {
     tag: u64,
     busy: AtomicBool,

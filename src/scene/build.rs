@@ -157,12 +157,14 @@ impl Builder<'_> {
             Some(spec) => {
                 terms.push(Box::new(Inertia { m: masses() }));
                 let start = self.text.choice("inertia", "start", &spec.start)?.unwrap_or("equilibrium");
+                let reduction = self.reduction(spec, file, &mesh, &bones, &terms, n_history)?;
                 Some(sim::Inertia {
                     m: masses(),
                     start_at_rest: start == "rest",
                     scheme: self.scheme(spec)?,
                     damping_mass: self.text.number("inertia", "damping_mass", &spec.damping_mass)?.unwrap_or(0.0),
                     accuracy: self.accuracy(spec, tolerance)?,
+                    reduction,
                 })
             }
             None => None,

@@ -289,6 +289,7 @@ pub struct InertiaSpec {
     pub damping_mass: Option<Spanned<f64>>,
     pub damping_stiffness: Option<Spanned<f64>>,
     pub accuracy: Option<Spanned<f64>>,
+    pub modes: Option<Spanned<u32>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

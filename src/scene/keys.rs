@@ -210,6 +210,7 @@ pub const KEYS: &[Key] = &[
     key("inertia", "damping_mass", "float", "1/s", NonNegative, "0", "Damping force in units of mass times velocity."),
     key("inertia", "damping_stiffness", "float", "s", NonNegative, "0", "Damping stress in units of the small-strain stiffness times strain rate; rotations feel nothing."),
     key("inertia", "accuracy", "float", "m", Positive, "none", "Cuts each step into as many pieces (256 at most) as keep the estimated error of a piece below this; at least ten times the solver's `tolerance`."),
+    key("inertia", "modes", "integer", "", AtLeastOne, "all unknowns", "Moves in this many of the slowest modes of vibration, in microseconds a step; what they leave out follows loads and bones without inertia. Wants tissue of the law `linear`, bones held or moved, no muscles, no pressures, and has no derivatives by inputs; `cutis check` tells what the modes hold."),
     key("attachment", "free_rings", "integer", "", NonNegative, "0", "Bone nodes that two bones claim, or within this many edges of another bone, are set free (osteotomy lines, joints)."),
     key("solver", "method", "string", "", OneOf(&["quasi-newton", "newton"]), "\"quasi-newton\"", "L-BFGS over a kept factor (scenes that are linear in their inputs are read off a table instead), or Newton with a new factor in every iteration."),
     key("solver", "tolerance", "float", "m", Positive, "1e-7", "Largest nodal motion of the last correction."),

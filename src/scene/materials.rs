@@ -109,7 +109,9 @@ impl Builder<'_> {
         }
         let fields = Fields { mesh, bones: attached(&file.bone, mesh), depth: OnceCell::new() };
         let mut out = Terms::default();
-        let beta = file.inertia.as_ref().and_then(|i| i.damping_stiffness.as_ref());
+        // In modes damping is a number, no term.
+        let inertia = file.inertia.as_ref().filter(|i| i.modes.is_none());
+        let beta = inertia.and_then(|i| i.damping_stiffness.as_ref());
         let beta = beta.map_or(Ok(0.0), |b| self.text.checked("inertia", "damping_stiffness", b))?;
         let mut density = vec![0.0; mesh.region_names.len()];
         let names = self.text.names("tissue", file.tissue.iter().filter_map(|t| t.tunable.as_ref()))?;

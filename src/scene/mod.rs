@@ -16,6 +16,7 @@ mod materials;
 mod place;
 mod presets;
 mod programme;
+mod reduction;
 mod rest_shape;
 mod source;
 mod springs;

@@ -77,8 +77,8 @@ impl Sim {
     /// the inputs at its end, what came before held.
     ///
     /// # Errors
-    /// [`SimError::NoDerivative`] before the first equilibrium, and in scenes with inertia or memory where no step of this
-    /// run led to the state; [`SimError::Port`], [`SimError::Range`], and as for [`Sim::step`] if the stiffness cannot be
+    /// [`SimError::NoDerivative`] before the first equilibrium, in scenes in modes, and in those with inertia or memory where no
+    /// step of this run led to the state; [`SimError::Port`], [`SimError::Range`], and as for [`Sim::step`] if the stiffness cannot be
     /// factored. The state does not change.
     pub fn directional_derivative(
         &mut self,

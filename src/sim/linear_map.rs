@@ -26,8 +26,8 @@ use crate::solve::{Minimiser, Problem};
 const SMALL: usize = 8_000_000;
 
 /// What a column is the answer to.
-#[derive(Debug, Clone, Copy)]
-enum Cause {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Cause {
     /// An entry of R - I of a bone.
     Turn { bone: usize, i: usize, j: usize },
     /// A coordinate of the translation of a bone.
@@ -39,14 +39,14 @@ enum Cause {
 }
 
 /// Positions of some free nodes as a function of q, eight nodes side by side.
-struct Field {
+pub(super) struct Field {
     nodes: Vec<u32>,
     /// Of each batch and coordinate: the offset, then the columns.
     values: Vec<[f64; BATCH]>,
 }
 
 /// Reaction on a bone as a function of q; the first entry is that of q = 0.
-struct Reaction {
+pub(super) struct Reaction {
     force: Vec<Vec3>,
     /// `sum_a r_a (x) f_a` over the nodes of the bone, arms as at rest.
     moment: Vec<Mat3>,
@@ -54,31 +54,36 @@ struct Reaction {
     nodal: Vec<Vec3>,
 }
 
-/// The table of one model under one set of parameters.
+/// The table of one model under one set of parameters. Where it holds modes (`super::modal`), their columns follow those of
+/// the causes, and their coordinates the causes in q.
 pub(super) struct LinearMap {
     causes: Vec<Cause>,
     /// The inputs it was made for; those that are causes count for nothing.
     made_for: Vec<f64>,
     is_cause: Vec<bool>,
-    q: Vec<f64>,
+    pub(super) q: Vec<f64>,
     /// All free nodes.
-    whole: Field,
+    pub(super) whole: Field,
     /// Free nodes that ports read, and nodes of bones among those.
-    seen: Field,
-    seen_on_bones: Vec<(u32, u32, u32)>,
+    pub(super) seen: Field,
+    pub(super) seen_on_bones: Vec<(u32, u32, u32)>,
     reactions: Vec<Reaction>,
     /// Norm of the residual (N) and last correction (m) of each column; the first is that of q = 0.
     residuals: Vec<f64>,
     corrections: Vec<f64>,
 }
 
-/// Causes of a scene that is linear in its inputs; none of one that is not, or that asks for Newton's method.
-fn causes(model: &Model) -> Option<Vec<Cause>> {
+/// Causes of a scene whose equilibrium may be read off a table; none where it is not linear in the inputs, is no
+/// equilibrium, or where the scene asks for Newton's method.
+fn tabulated(model: &Model) -> Option<Vec<Cause>> {
+    let wanted = model.parts().strategy.memory > 0 && !model.remembers();
+    wanted.then(|| causes(model)).flatten()
+}
+
+/// Causes of a scene whose forces are linear in its inputs; none of one where they are not.
+pub(super) fn causes(model: &Model) -> Option<Vec<Cause>> {
     let parts = model.parts();
-    if parts.strategy.memory == 0 {
-        return None;
-    }
-    if !model.is_quadratic() || model.remembers() || !parts.muscles.is_empty() || !parts.pressures.is_empty() {
+    if !model.is_quadratic() || !parts.muscles.is_empty() || !parts.pressures.is_empty() {
         return None;
     }
     let mut causes = Vec::new();
@@ -104,29 +109,113 @@ fn causes(model: &Model) -> Option<Vec<Cause>> {
 }
 
 /// What the columns are solved with.
-struct Builder<'a> {
+pub(super) struct Builder<'a> {
     model: &'a Model,
-    minimiser: &'a mut Minimiser,
-    inputs: Vec<f64>,
-    pivots: Vec<Vec3>,
-    config: Configuration,
-    nodal: Vec<Vec3>,
-    g: Vec<Vec3>,
+    pub(super) minimiser: &'a mut Minimiser,
+    made_for: Vec<f64>,
+    is_cause: Vec<bool>,
+    pub(super) inputs: Vec<f64>,
+    pub(super) pivots: Vec<Vec3>,
+    pub(super) config: Configuration,
+    pub(super) nodal: Vec<Vec3>,
+    pub(super) g: Vec<Vec3>,
     /// Linear solves so far.
-    solves: u32,
+    pub(super) solves: u32,
 }
 
 /// A solved column.
-struct Column {
-    d: Vec<Vec3>,
+pub(super) struct Column {
+    /// Motion of the unknowns, m for each unit of the cause.
+    pub(super) d: Vec<Vec3>,
     /// Gradient at the nodes, N.
-    nodal: Vec<Vec3>,
-    residual: f64,
-    correction: f64,
+    pub(super) nodal: Vec<Vec3>,
+    pub(super) residual: f64,
+    pub(super) correction: f64,
 }
 
-impl Builder<'_> {
-    fn gradient(&mut self) {
+impl<'a> Builder<'a> {
+    /// With the stiffness of these inputs factored.
+    pub(super) fn new(
+        model: &'a Model,
+        minimiser: &'a mut Minimiser,
+        inputs: &[f64],
+    ) -> Result<Builder<'a>, SolveError> {
+        let parts = model.parts();
+        let X = &parts.mesh.nodes;
+        let mut is_cause = vec![false; inputs.len()];
+        let mut mark = |slot: Slot, len: usize| {
+            if let Some(first) = parts.layout.first(slot) {
+                is_cause[first..first + len].fill(true);
+            }
+        };
+        let n_bones = parts.bones.len();
+        mark(Slot::BoneTranslation, 3 * n_bones);
+        mark(Slot::BoneRotation, 3 * n_bones);
+        mark(Slot::LoadForce, 3 * parts.loads.len());
+        mark(Slot::Gravity, 3);
+        for (b, bone) in parts.bones.iter().enumerate() {
+            mark(Slot::BoneNodal(b as u32), 3 * bone.nodes.len());
+        }
+        let still = |(&value, &cause): (&f64, &bool)| if cause { 0.0 } else { value };
+        let mut builder = Builder {
+            model,
+            minimiser,
+            inputs: inputs.iter().zip(&is_cause).map(still).collect(),
+            made_for: inputs.to_vec(),
+            is_cause,
+            pivots: vec![Vec3::zeros(); n_bones],
+            config: Configuration { x: X.clone(), poses: vec![Pose::REST; n_bones] },
+            nodal: vec![Vec3::zeros(); X.len()],
+            g: vec![Vec3::zeros(); model.dofs().n_blocks()],
+            solves: 0,
+        };
+        read_pivots(model, inputs, &mut builder.pivots);
+        let problem = Problem {
+            terms: &parts.terms,
+            dofs: model.dofs(),
+            X,
+            pivots: &builder.pivots,
+            wrenches: &[],
+            at: At { inputs: &builder.inputs, ..At::NOWHERE },
+        };
+        builder.minimiser.linearise(&problem, &builder.config)?;
+        Ok(builder)
+    }
+
+    /// The answer to nothing, then to each cause; what is at rest is where the builder stays.
+    pub(super) fn columns(&mut self, causes: &[Cause]) -> Vec<Column> {
+        let mut columns = vec![self.column(None, None)];
+        let (rest, g) = (self.config.clone(), self.g.clone());
+        for &cause in causes {
+            self.set(cause, 1.0);
+            columns.push(self.column(Some(&g), Some(&columns[0].nodal)));
+            self.set(cause, 0.0);
+            self.config.copy_from(&rest);
+        }
+        columns
+    }
+
+    /// The table of these columns.
+    pub(super) fn tabulate(self, causes: Vec<Cause>, columns: &[Column]) -> LinearMap {
+        let model = self.model;
+        let (seen, seen_on_bones) = seen(model);
+        let nodal: Vec<&[Vec3]> = columns.iter().map(|c| &c.nodal[..]).collect();
+        let n_bones = model.parts().bones.len();
+        LinearMap {
+            q: vec![0.0; columns.len() - 1],
+            whole: Field::new(model, model.dofs().free.clone(), columns),
+            seen: Field::new(model, seen, columns),
+            seen_on_bones,
+            reactions: (0..n_bones).map(|b| Reaction::new(model, &self.pivots, b, &nodal)).collect(),
+            residuals: columns.iter().map(|c| c.residual).collect(),
+            corrections: columns.iter().map(|c| c.correction).collect(),
+            causes,
+            made_for: self.made_for,
+            is_cause: self.is_cause,
+        }
+    }
+
+    pub(super) fn gradient(&mut self) {
         let parts = self.model.parts();
         let problem = Problem {
             terms: &parts.terms,
@@ -171,8 +260,13 @@ impl Builder<'_> {
         Column { d, nodal, residual, correction }
     }
 
+    /// Moves the free nodes by `d`.
+    pub(super) fn move_free(&mut self, d: &[Vec3]) {
+        self.model.dofs().free.iter().zip(d).for_each(|(&a, d)| self.config.x[a as usize] += d);
+    }
+
     /// Sets one cause to one, or back to nothing.
-    fn set(&mut self, cause: Cause, value: f64) {
+    pub(super) fn set(&mut self, cause: Cause, value: f64) {
         let parts = self.model.parts();
         let X = &parts.mesh.nodes;
         match cause {
@@ -207,73 +301,17 @@ impl LinearMap {
         minimiser: &mut Minimiser,
         inputs: &[f64],
     ) -> Result<Option<(LinearMap, u32)>, SolveError> {
-        let Some(causes) = causes(model) else {
+        let Some(causes) = tabulated(model) else {
             return Ok(None);
         };
-        let parts = model.parts();
-        let X = &parts.mesh.nodes;
-        let table = 3 * X.len() * (causes.len() + 1) * size_of::<f64>();
+        let table = 3 * model.mesh().nodes.len() * (causes.len() + 1) * size_of::<f64>();
         if table > minimiser.memory().max(SMALL) {
             return Ok(None);
         }
-        let mut is_cause = vec![false; inputs.len()];
-        let mut mark = |slot: Slot, len: usize| {
-            if let Some(first) = parts.layout.first(slot) {
-                is_cause[first..first + len].fill(true);
-            }
-        };
-        let n_bones = parts.bones.len();
-        mark(Slot::BoneTranslation, 3 * n_bones);
-        mark(Slot::BoneRotation, 3 * n_bones);
-        mark(Slot::LoadForce, 3 * parts.loads.len());
-        mark(Slot::Gravity, 3);
-        for (b, bone) in parts.bones.iter().enumerate() {
-            mark(Slot::BoneNodal(b as u32), 3 * bone.nodes.len());
-        }
-        let still = |(&value, &cause): (&f64, &bool)| if cause { 0.0 } else { value };
-        let mut builder = Builder {
-            model,
-            minimiser,
-            inputs: inputs.iter().zip(&is_cause).map(still).collect(),
-            pivots: vec![Vec3::zeros(); n_bones],
-            config: Configuration { x: X.clone(), poses: vec![Pose::REST; n_bones] },
-            nodal: vec![Vec3::zeros(); X.len()],
-            g: vec![Vec3::zeros(); model.dofs().n_blocks()],
-            solves: 0,
-        };
-        read_pivots(model, inputs, &mut builder.pivots);
-        let problem = Problem {
-            terms: &parts.terms,
-            dofs: model.dofs(),
-            X,
-            pivots: &builder.pivots,
-            wrenches: &[],
-            at: At { inputs: &builder.inputs, ..At::NOWHERE },
-        };
-        builder.minimiser.linearise(&problem, &builder.config)?;
-        let mut columns = vec![builder.column(None, None)];
-        let (rest, g) = (builder.config.clone(), builder.g.clone());
-        for &cause in &causes {
-            builder.set(cause, 1.0);
-            columns.push(builder.column(Some(&g), Some(&columns[0].nodal)));
-            builder.set(cause, 0.0);
-            builder.config.copy_from(&rest);
-        }
-        let (seen, seen_on_bones) = seen(model);
-        let reactions = (0..n_bones).map(|b| Reaction::new(model, &builder.pivots, b, &columns)).collect();
-        let map = LinearMap {
-            q: vec![0.0; causes.len()],
-            whole: Field::new(model, model.dofs().free.clone(), &columns),
-            seen: Field::new(model, seen, &columns),
-            seen_on_bones,
-            reactions,
-            residuals: columns.iter().map(|c| c.residual).collect(),
-            corrections: columns.iter().map(|c| c.correction).collect(),
-            causes,
-            made_for: inputs.to_vec(),
-            is_cause,
-        };
-        Ok(Some((map, builder.solves)))
+        let mut builder = Builder::new(model, minimiser, inputs)?;
+        let columns = builder.columns(&causes);
+        let solves = builder.solves;
+        Ok(Some((builder.tabulate(causes, &columns), solves)))
     }
 
     /// Whether it holds under these inputs.
@@ -304,7 +342,7 @@ impl LinearMap {
 
     /// Puts the nodes that ports read where the causes as set want them.
     pub fn place_seen(&self, model: &Model, inputs: &[f64], pivots: &[Vec3], config: &mut Configuration) {
-        self.seen.place(&self.q, &mut config.x);
+        self.seen.place(1.0, &self.q, &mut config.x);
         for &(bone, k, a) in &self.seen_on_bones {
             config.x[a as usize] = target(model, inputs, pivots, &config.poses, bone as usize, k as usize);
         }
@@ -312,7 +350,7 @@ impl LinearMap {
 
     /// Puts all nodes there.
     pub fn place_whole(&self, model: &Model, inputs: &[f64], pivots: &[Vec3], config: &mut Configuration) {
-        self.whole.place(&self.q, &mut config.x);
+        self.whole.place(1.0, &self.q, &mut config.x);
         for (b, bone) in model.parts().bones.iter().enumerate() {
             for (k, &a) in bone.nodes.iter().enumerate() {
                 config.x[a as usize] = target(model, inputs, pivots, &config.poses, b, k);
@@ -322,37 +360,51 @@ impl LinearMap {
 
     /// Force (N) and torque (N m, about the moved pivot) that the tissue exerts on a bone.
     pub fn reaction(&self, model: &Model, inputs: &[f64], bone: usize, pose: &Pose) -> (Vec3, Vec3) {
-        let Reaction { force, moment, nodal } = &self.reactions[bone];
-        let (mut f, mut m) = (force[0], moment[0]);
-        for ((force, moment), &q) in force[1..].iter().zip(&moment[1..]).zip(&self.q) {
-            f += q * force;
-            m += q * moment;
-        }
-        let first = model.parts().layout.first(Slot::BoneNodal(bone as u32)).unwrap_or(0);
-        for (k, forces) in nodal.chunks_exact(self.q.len() + 1).enumerate() {
-            let u = Vec3::from_column_slice(&inputs[first + 3 * k..first + 3 * k + 3]);
-            let f = forces[1..].iter().zip(&self.q).fold(forces[0], |f, (column, &q)| f + q * column);
-            m += u * f.transpose();
-        }
-        let m = pose.R * m;
-        (f, Vec3::new(m[(1, 2)] - m[(2, 1)], m[(2, 0)] - m[(0, 2)], m[(0, 1)] - m[(1, 0)]))
+        self.reactions[bone].of(model, inputs, bone, pose, 1.0, &self.q)
     }
 }
 
 impl Reaction {
-    fn new(model: &Model, pivots: &[Vec3], bone: usize, columns: &[Column]) -> Reaction {
+    /// From the gradients at the nodes of each column, N.
+    pub(super) fn new(model: &Model, pivots: &[Vec3], bone: usize, columns: &[&[Vec3]]) -> Reaction {
         let nodes = &model.parts().bones[bone].nodes;
         let X = &model.parts().mesh.nodes;
         let arm = |a: u32| X[a as usize] - pivots[bone];
-        let force = |c: &Column| nodes.iter().map(|&a| -c.nodal[a as usize]).sum();
-        let moment = |c: &Column| nodes.iter().map(|&a| -arm(a) * c.nodal[a as usize].transpose()).sum();
+        let force = |nodal: &&[Vec3]| nodes.iter().map(|&a| -nodal[a as usize]).sum();
+        let moment = |nodal: &&[Vec3]| nodes.iter().map(|&a| -arm(a) * nodal[a as usize].transpose()).sum();
         let by_node = model.parts().bones[bone].drive == Drive::Displacement;
-        let of_node = |&a: &u32| columns.iter().map(move |c| -c.nodal[a as usize]);
+        let of_node = |&a: &u32| columns.iter().map(move |nodal| -nodal[a as usize]);
         Reaction {
             force: columns.iter().map(force).collect(),
             moment: columns.iter().map(moment).collect(),
             nodal: nodes.iter().filter(|_| by_node).flat_map(of_node).collect(),
         }
+    }
+
+    /// Force (N) and torque (N m, about the moved pivot) of `first` times the first column and `q` times the others.
+    pub(super) fn of(
+        &self,
+        model: &Model,
+        inputs: &[f64],
+        bone: usize,
+        pose: &Pose,
+        first: f64,
+        q: &[f64],
+    ) -> (Vec3, Vec3) {
+        let Reaction { force, moment, nodal } = self;
+        let (mut f, mut m) = (first * force[0], first * moment[0]);
+        for ((force, moment), &q) in force[1..].iter().zip(&moment[1..]).zip(q) {
+            f += q * force;
+            m += q * moment;
+        }
+        let port = model.parts().layout.first(Slot::BoneNodal(bone as u32)).unwrap_or(0);
+        for (k, forces) in nodal.chunks_exact(q.len() + 1).enumerate() {
+            let u = Vec3::from_column_slice(&inputs[port + 3 * k..port + 3 * k + 3]);
+            let f = forces[1..].iter().zip(q).fold(first * forces[0], |f, (column, &q)| f + q * column);
+            m += u * f.transpose();
+        }
+        let m = pose.R * m;
+        (f, Vec3::new(m[(1, 2)] - m[(2, 1)], m[(2, 0)] - m[(0, 2)], m[(0, 1)] - m[(1, 0)]))
     }
 }
 
@@ -392,14 +444,26 @@ impl Field {
         Field { nodes, values }
     }
 
-    fn place(&self, q: &[f64], x: &mut [Vec3]) {
-        Arch::new().dispatch(Place { field: self, q, x });
+    /// The sum of a column times the field `f` of nodes.
+    pub(super) fn product(&self, column: usize, f: impl Fn(usize) -> Vec3) -> f64 {
+        let columns = self.values.len() / (3 * self.nodes.len().div_ceil(BATCH)).max(1);
+        let of = |(n, &a): (usize, &u32)| {
+            let f = f(a as usize);
+            (0..3).map(|c| self.values[(n / BATCH * 3 + c) * columns + column][n % BATCH] * f[c]).sum::<f64>()
+        };
+        self.nodes.iter().enumerate().map(of).sum()
+    }
+
+    /// Overwrites its nodes of `x` with `first` times the first column and `q` times the others.
+    pub(super) fn place(&self, first: f64, q: &[f64], x: &mut [Vec3]) {
+        Arch::new().dispatch(Place { field: self, first, q, x });
     }
 }
 
 /// The product, compiled for each width of vectors.
 struct Place<'a> {
     field: &'a Field,
+    first: f64,
     q: &'a [f64],
     x: &'a mut [Vec3],
 }
@@ -409,13 +473,13 @@ impl WithSimd for Place<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Place { field, q, x } = self;
+        let Place { field, first, q, x } = self;
         let mut places = [[0.0; BATCH]; 3];
         let columns = q.len() + 1;
         for (nodes, values) in field.nodes.chunks(BATCH).zip(field.values.chunks_exact(3 * columns)) {
             for (place, values) in places.iter_mut().zip(values.chunks_exact(columns)) {
                 for k in 0..BATCH / S::F64_LANES {
-                    let mut sum = Lane::load(simd, &values[0], k);
+                    let mut sum = Lane::load(simd, &values[0], k) * first;
                     for (q, column) in q.iter().zip(&values[1..]) {
                         sum = Lane::splat(simd, *q).mul_add(Lane::load(simd, column, k), sum);
                     }

@@ -7,7 +7,9 @@ mod adjoint;
 mod ahead;
 mod derivative;
 mod linear_map;
+mod modal;
 mod model;
+mod modes;
 mod motion;
 mod pace;
 mod past;
@@ -20,7 +22,8 @@ mod state;
 mod step;
 
 pub use access::View;
-pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, StandIn, Unconstrained, osteotomy_edges};
+pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, Reduction, StandIn, Unconstrained, osteotomy_edges};
+pub use modes::Spectrum;
 pub use ports::Layout;
 pub(crate) use ports::MOST_TUNABLE;
 pub use scheme::Scheme;
@@ -62,6 +65,19 @@ pub enum SimError {
     /// The step length is no positive number.
     #[error("a step must be a positive, finite number of seconds, from 1e-100 to 1e100; found {0:?}")]
     StepLength(f64),
+    /// The table of a scene in modes would be too large.
+    #[error(
+        "{columns} inputs and modes would fill a table of {bytes} bytes, the limit is {limit}: take fewer `modes` of \
+         [inertia], drive bones by pose instead of node by node, or leave `modes` out"
+    )]
+    TooManyModes {
+        /// Inputs and modes.
+        columns: usize,
+        /// Size of the table.
+        bytes: usize,
+        /// Most.
+        limit: usize,
+    },
     /// An input is NaN or infinite.
     #[error("input `{name}` is {value:?}; every input must be a finite number")]
     NotFinite {
@@ -289,10 +305,11 @@ impl Sim {
     }
 
     /// Puts the free nodes at the positions `x` (m, one for each node of the mesh) and forgets the linearisation: the
-    /// next step seeks the equilibrium from there. Nodes of bones, time, velocities and outputs stay as they are.
+    /// next step seeks the equilibrium from there. Nodes of bones, time, velocities and outputs stay as they are. A scene in
+    /// modes takes of the positions what its modes hold.
     ///
     /// # Errors
-    /// [`SimError::StartLength`], [`SimError::StartNotFinite`]; nothing has changed then.
+    /// [`SimError::StartLength`], [`SimError::StartNotFinite`], and as for [`Sim::spectrum`]; nothing has changed then.
     pub fn start_from(&mut self, x: &[crate::math::Vec3]) -> Result<(), SimError> {
         let wanted = self.model.mesh().nodes.len();
         if x.len() != wanted {
@@ -303,6 +320,9 @@ impl Sim {
         }
         self.strain();
         step::complete(&self.model, &mut self.state, &self.work);
+        if step::start_from(&self.model, &mut self.state, &mut self.work, x)? {
+            return Ok(());
+        }
         for &a in &self.model.dofs().free {
             self.state.config.x[a as usize] = x[a as usize];
         }
@@ -324,6 +344,14 @@ impl Sim {
             return &self.state.config.x;
         }
         self.whole.get_or_init(|| self.save().config.x)
+    }
+
+    /// What the modes of a scene hold and what they leave out, under the inputs as set; `None` for scenes not in modes.
+    ///
+    /// # Errors
+    /// [`SimError::TooManyModes`], and [`SimError::Setup`] if the modes are not found.
+    pub fn spectrum(&mut self) -> Result<Option<Spectrum>, SimError> {
+        step::spectrum(&self.model, &self.state, &mut self.work)
     }
 
     /// Bytes of matrices, factor and solver, twice that with a factor made in the background; those of the model and of the

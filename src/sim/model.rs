@@ -70,6 +70,17 @@ pub struct Inertia {
     pub damping_mass: f64,
     /// Largest estimated error of a piece of a step, m; steps are not cut for it if there is none.
     pub accuracy: Option<f64>,
+    /// Modes instead of all unknowns; the scene must be linear then.
+    pub reduction: Option<Reduction>,
+}
+
+/// Linear dynamics in the slowest modes of vibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reduction {
+    /// How many.
+    pub modes: usize,
+    /// Damping in proportion to the stiffness, s: a number here, no term.
+    pub damping_stiffness: f64,
 }
 
 /// Makes terms of all elements in a law that is defined everywhere and whose only rest is untangled.
@@ -157,7 +168,7 @@ impl Model {
     /// Finishes a model: splits the unknowns, lists the ports, checks that the tissue is held.
     ///
     /// # Errors
-    /// [`Unconstrained`] for a quasi-static scene with loose tissue.
+    /// [`Unconstrained`] for a scene with loose tissue that is quasi-static or in modes.
     pub fn new(mut parts: ModelParts) -> Result<Model, Unconstrained> {
         let mut prescribed: Vec<u32> =
             parts.bones.iter().filter(|b| b.drive != Drive::Force).flat_map(|b| b.nodes.iter().copied()).collect();
@@ -166,7 +177,7 @@ impl Model {
         let rigid = rigid.map(|(k, b)| (k, b.nodes.clone())).collect();
         let mut dofs = Dofs::new(parts.mesh.nodes.len(), prescribed, rigid);
         dofs.elimination = parts.mesh.elimination.take();
-        if parts.inertia.is_none() {
+        if parts.inertia.as_ref().is_none_or(|i| i.reduction.is_some()) {
             check_held(&parts, &dofs)?;
         }
         let skin = Skin::new(&parts.mesh, parts.embedding.take());
@@ -217,6 +228,10 @@ impl Model {
     /// Whether the stiffness is the same everywhere.
     pub(super) fn is_quadratic(&self) -> bool {
         self.dofs.bodies.is_empty() && self.parts.terms.iter().all(|t| t.is_quadratic())
+    }
+    /// Whether it moves in modes of vibration; its steps have no derivatives by inputs then.
+    pub fn is_reduced(&self) -> bool {
+        self.parts.inertia.as_ref().is_some_and(|i| i.reduction.is_some())
     }
     /// What a host reads of the surface.
     pub fn skin(&self) -> &Skin {

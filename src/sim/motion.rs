@@ -21,13 +21,19 @@ pub(super) struct Motion {
 impl Motion {
     /// Nothing moves.
     pub fn still(n_nodes: usize, inertia: Option<&Inertia>) -> Motion {
-        let remembers = inertia.is_some_and(|i| i.scheme.remembers());
+        // In modes it is their coordinates that are remembered.
+        let remembers = inertia.is_some_and(|i| i.scheme.remembers() && i.reduction.is_none());
         Motion {
             v: vec![Vec3::zeros(); if inertia.is_some() { n_nodes } else { 0 }],
             memory: vec![[Vec3::zeros(); 2]; if remembers { n_nodes } else { 0 }],
             dt: 0.0,
             next_dt: 0.0,
         }
+    }
+
+    /// Whether its lists are as long as those of `other`.
+    pub fn fits(&self, other: &Motion) -> bool {
+        self.v.len() == other.v.len() && self.memory.len() == other.memory.len()
     }
 
     /// Overwrites itself with `other` without allocating.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
+use super::modal::Coordinates;
 use super::model::Model;
 use super::motion::Motion;
 use crate::bytes::{Reader, Truncated, Writer};
@@ -54,6 +55,8 @@ pub struct State {
     pub(super) partial: bool,
     /// What inertia knows of the steps before.
     pub(super) motion: Motion,
+    /// The same in modes of vibration; empty in scenes without.
+    pub(super) modal: Coordinates,
     /// What terms remember of the steps before (viscous overstress); empty in scenes without.
     pub(super) history: Vec<f64>,
     /// Inputs as the host set them last.
@@ -119,6 +122,7 @@ impl State {
             config: Configuration { x: parts.mesh.nodes.clone(), poses: vec![Pose::REST; n] },
             partial: false,
             motion: Motion::still(parts.mesh.nodes.len(), parts.inertia.as_ref()),
+            modal: Coordinates::still(model),
             history: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
             applied: rest_inputs(model),
@@ -143,8 +147,8 @@ impl State {
             && self.config.poses.len() == parts.bones.len()
             && self.inputs.len() == parts.layout.len()
             && self.history.len() == parts.n_history
-            && self.motion.v.is_empty() == parts.inertia.is_none()
-            && self.motion.memory.is_empty() != parts.inertia.as_ref().is_some_and(|i| i.scheme.remembers())
+            && self.motion.fits(&Motion::still(parts.mesh.nodes.len(), parts.inertia.as_ref()))
+            && self.modal.fits(&Coordinates::still(model))
     }
 
     /// Versioned, checksummed little-endian bytes; readable in another process with the same model.
@@ -157,6 +161,9 @@ impl State {
         put_vectors(&mut body, self.motion.memory.as_flattened());
         body.f64(self.motion.dt);
         body.f64(self.motion.next_dt);
+        if model.is_reduced() {
+            put_coordinates(&mut body, &self.modal);
+        }
         body.f64s(self.history.iter().copied());
         body.f64s(self.inputs.iter().copied());
         body.f64s(self.applied.iter().copied());
@@ -213,6 +220,7 @@ impl State {
         let t = r.f64()?;
         let config = take_config(&mut r, n, n_bones)?;
         let motion = take_motion(&mut r, &Motion::still(n, parts.inertia.as_ref()))?;
+        let modal = take_coordinates(&mut r, Coordinates::still(model), model.is_reduced())?;
         let history = take_f64s(&mut r, "remembered values", parts.n_history)?;
         let inputs = take_f64s(&mut r, "inputs", n_inputs)?;
         let applied = take_f64s(&mut r, "inputs", n_inputs)?;
@@ -229,7 +237,19 @@ impl State {
             _ => Some(Upcoming { linearisation: Arc::new(take_linearisation(&mut r, model)?), solves: r.u32()? }),
         };
         let outputs = Outputs { reaction_force, reaction_torque, iterations, residual, converged, kinetic, dt };
-        Ok(State { t, config, partial: false, motion, history, inputs, applied, linearisation, upcoming, outputs })
+        Ok(State {
+            t,
+            config,
+            partial: false,
+            motion,
+            modal,
+            history,
+            inputs,
+            applied,
+            linearisation,
+            upcoming,
+            outputs,
+        })
     }
 }
 
@@ -281,6 +301,12 @@ fn take_linearisation(r: &mut Reader, model: &Model) -> Result<Linearisation, St
     })
 }
 
+fn put_coordinates(w: &mut Writer, c: &Coordinates) {
+    let Coordinates { p, v, memory, p_before, q, q_before, rate, pace } = c;
+    [&p[..], v, memory.as_flattened(), p_before].into_iter().for_each(|list| put_vectors(w, list));
+    [q, q_before, rate, pace].into_iter().for_each(|list| w.f64s(list.iter().copied()));
+}
+
 fn expect_len(what: &'static str, found: usize, wanted: usize) -> Result<(), StateError> {
     if found == wanted { Ok(()) } else { Err(StateError::Length { what, found, wanted }) }
 }
@@ -296,6 +322,20 @@ fn take_motion(r: &mut Reader, like: &Motion) -> Result<Motion, StateError> {
     let memory = take_vectors(r, "remembered motions", 2 * like.memory.len())?;
     let memory = memory.chunks_exact(2).map(|m| [m[0], m[1]]).collect();
     Ok(Motion { v, memory, dt: r.f64()?, next_dt: r.f64()? })
+}
+
+/// Those of scenes in modes; other scenes write none.
+fn take_coordinates(r: &mut Reader, like: Coordinates, written: bool) -> Result<Coordinates, StateError> {
+    if !written {
+        return Ok(like);
+    }
+    let (n, n_causes) = (like.p.len(), like.q.len());
+    let mut vectors = |n: usize| take_vectors(r, "modal coordinates", n);
+    let (p, v, memory, p_before) = (vectors(n)?, vectors(n)?, vectors(2 * n)?, vectors(n)?);
+    let memory = memory.chunks_exact(2).map(|m| [m[0], m[1]]).collect();
+    let mut numbers = || take_f64s(r, "causes", n_causes);
+    let (q, q_before, rate, pace) = (numbers()?, numbers()?, numbers()?, numbers()?);
+    Ok(Coordinates { p, v, memory, p_before, q, q_before, rate, pace })
 }
 
 fn take_f64s(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec<f64>, StateError> {

@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use super::ahead::Ahead;
 use super::linear_map::LinearMap;
+use super::modal;
 use super::model::{Drive, Model};
+use super::modes::{Modal, Spectrum};
 use super::motion::Motion;
 use super::pace::{Pace, even_part};
 use super::recover::untangle;
@@ -69,6 +71,8 @@ pub(super) struct Workspace {
     minimiser: Box<Minimiser>,
     /// The answer to every input, in scenes that are linear in them.
     table: Table,
+    /// The same with modes of vibration, in scenes that ask for them.
+    modal: Option<Box<Modal>>,
     /// Which linearisation the minimiser's factor was made from.
     factored: Option<Arc<Linearisation>>,
     /// The factor that the minimiser gets next.
@@ -132,6 +136,7 @@ impl Workspace {
         Ok(Workspace {
             minimiser: Box::new(Minimiser::new(&problem, parts.strategy)?),
             table: Table::Unknown,
+            modal: None,
             factored: None,
             ahead: Ahead::default(),
             config: Configuration { x: X.clone(), poses: vec![Pose::REST; parts.bones.len()] },
@@ -175,7 +180,7 @@ pub(super) fn initialise(model: &Arc<Model>, state: &mut State, work: &mut Works
         }
         state.applied.copy_from_slice(&state.inputs);
         state.outputs.converged = true;
-        set_off(model, state, work);
+        set_off(model, state, work)?;
         return Ok(StepReport::new(0));
     }
     let report = advance(model, state, work, 0.0, None)?;
@@ -185,10 +190,13 @@ pub(super) fn initialise(model: &Arc<Model>, state: &mut State, work: &mut Works
 }
 
 /// Gives the tissue the acceleration that its forces make at rest, where the scheme remembers one.
-fn set_off(model: &Model, state: &mut State, work: &mut Workspace) {
+fn set_off(model: &Model, state: &mut State, work: &mut Workspace) -> Result<(), SimError> {
+    if model.is_reduced() {
+        return modal::set_off(model, state, &mut work.minimiser, &mut work.modal);
+    }
     let parts = model.parts();
     let Some(inertia) = parts.inertia.as_ref().filter(|i| matches!(i.scheme, Scheme::GeneralisedAlpha { .. })) else {
-        return;
+        return Ok(());
     };
     read_wrenches(model, &state.inputs, &mut work.wrenches);
     let Workspace { pivots, wrenches, inputs, history, .. } = work;
@@ -197,6 +205,7 @@ fn set_off(model: &Model, state: &mut State, work: &mut Workspace) {
     let problem = Problem { terms: &parts.terms, dofs: model.dofs(), X: &parts.mesh.nodes, pivots, wrenches, at };
     let a = accelerations(&problem, &state.config, &inertia.m);
     state.motion.memory.iter_mut().zip(a).for_each(|(memory, a)| memory[0] = a);
+    Ok(())
 }
 
 /// Moves `state` on by `dt` seconds, or leaves it as it is; `watch` sees the state after each accepted piece but the last.
@@ -212,6 +221,9 @@ pub(super) fn advance(
         return Ok(report);
     }
     if let Some(report) = look_up(model, state, work, dt)? {
+        return Ok(report);
+    }
+    if let Some(report) = modal::advance(model, state, &mut work.minimiser, &mut work.modal, dt)? {
         return Ok(report);
     }
     read_pivots(model, &state.inputs, &mut work.pivots);
@@ -432,6 +444,7 @@ fn look_up(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> R
 
 /// Puts all nodes of a state that was read off the table where they belong, not only those that ports read.
 pub(super) fn complete(model: &Model, state: &mut State, work: &Workspace) {
+    modal::complete(model, state, &work.modal);
     if let (true, Table::Made(map)) = (state.partial, &work.table) {
         let mut pivots = vec![Vec3::zeros(); model.parts().bones.len()];
         read_pivots(model, &state.applied, &mut pivots);
@@ -440,8 +453,18 @@ pub(super) fn complete(model: &Model, state: &mut State, work: &Workspace) {
     }
 }
 
+/// As [`modal::start_from`].
+pub(super) fn start_from(model: &Model, state: &mut State, work: &mut Workspace, x: &[Vec3]) -> Result<bool, SimError> {
+    modal::start_from(model, state, &mut work.minimiser, &mut work.modal, x)
+}
+
+/// As [`modal::spectrum`].
+pub(super) fn spectrum(model: &Model, state: &State, work: &mut Workspace) -> Result<Option<Spectrum>, SimError> {
+    modal::spectrum(model, state, &mut work.minimiser, &mut work.modal)
+}
+
 impl StepReport {
-    fn new(substeps: u32) -> StepReport {
+    pub(super) fn new(substeps: u32) -> StepReport {
         StepReport {
             iterations: 0,
             factorisations: 0,
@@ -797,7 +820,7 @@ fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
 }
 
 /// The largest jump of displacement across a bone-to-bone edge, in lengths of the edge.
-fn worst_jump(model: &Model, x: &[Vec3]) -> Option<(f64, u32, u32)> {
+pub(super) fn worst_jump(model: &Model, x: &[Vec3]) -> Option<(f64, u32, u32)> {
     let X = &model.mesh().nodes;
     let jump = |&(a, b): &(u32, u32)| {
         let (i, j) = (a as usize, b as usize);
@@ -807,7 +830,7 @@ fn worst_jump(model: &Model, x: &[Vec3]) -> Option<(f64, u32, u32)> {
 }
 
 /// Tells of bones that moved apart across a single element.
-fn warn_of_jumps(
+pub(super) fn warn_of_jumps(
     model: &Model,
     before: Option<(f64, u32, u32)>,
     after: Option<(f64, u32, u32)>,

@@ -4,6 +4,7 @@
 
 mod choice;
 mod cholesky;
+mod eigen;
 mod gradients;
 mod halves;
 mod incomplete;
@@ -17,6 +18,7 @@ mod sweep;
 mod worker;
 
 pub use cholesky::{Cholesky, MOST_ENTRIES};
+pub use eigen::{Modes, slowest_modes};
 pub use gradients::Gradients;
 pub use minimise::{Minimiser, Outcome, Strategy};
 pub use ordering::{elimination, nested_dissection};
@@ -75,6 +77,18 @@ pub enum SolveError {
          choose a law that resists collapse (neo-hookean), or take it as it is with [solver] inversion = \"allow\""
     )]
     Inverts,
+    /// The modes of vibration were not all found.
+    #[error(
+        "{found} of {wanted} modes of vibration were found among {size} directions: ask for other `modes` of [inertia],          or leave them out"
+    )]
+    Modes {
+        /// Found.
+        found: usize,
+        /// Wanted.
+        wanted: usize,
+        /// Directions searched.
+        size: usize,
+    },
 }
 
 impl SolveError {
@@ -82,9 +96,11 @@ impl SolveError {
     pub fn iterations(&self) -> u32 {
         match self {
             SolveError::NotConverged { iterations, .. } => *iterations,
-            SolveError::Singular { .. } | SolveError::NotFinite | SolveError::Inverts | SolveError::TooLarge { .. } => {
-                1
-            }
+            SolveError::Singular { .. }
+            | SolveError::NotFinite
+            | SolveError::Inverts
+            | SolveError::TooLarge { .. }
+            | SolveError::Modes { .. } => 1,
         }
     }
 }

@@ -62,6 +62,19 @@ fn copies_freely(model: cutis::sim::Model) {
 }
 
 #[test]
+fn a_step_in_modes_after_the_first_allocates_nothing() {
+    let scene = super::util::root().join("tests/scenes/inertia_modes.toml");
+    let mut sim = Sim::new(Arc::new(cutis::load::from_file(&scene).unwrap().model)).unwrap();
+    let translation = sim.model().ports().iter().position(|p| p.name == "bone.translation").unwrap();
+    sim.initialise().unwrap();
+    for k in 1..=4 {
+        sim.set_f64(translation, 0, &[1e-3 * f64::from(k), 0.0, 0.0]).unwrap();
+        let counted = allocations(|| drop(sim.step(0.02).unwrap()));
+        assert!(k == 1 || counted == 0, "step {k}: {counted} allocations");
+    }
+}
+
+#[test]
 fn a_step_after_the_first_allocates_nothing() {
     let mut sim = Sim::new(Arc::new(cutis::load::embedded().unwrap().model)).unwrap();
     let rotation = sim.model().ports().iter().position(|p| p.name == "bone.rotation").unwrap();

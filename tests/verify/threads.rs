@@ -20,7 +20,7 @@ const IN_TIME: Case = Case { scene: "shake", poses: &[1, 2, 3, 4] };
 impl Case {
     fn begin(&self, solver: &str) -> Sim {
         let scene = SCENES.iter().find(|s| s.name == self.scene).expect("a scene of the bench");
-        sim(&scene.text(&SIZES[1], solver))
+        sim(&scene.text(&SIZES[1], solver, false))
     }
 
     /// Step to a pose; returns the number of factorisations.
