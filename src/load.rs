@@ -4,13 +4,11 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
-use crate::fem::Assembly;
 use crate::geometry::{Block, Head, Pattern, block};
 use crate::io;
-use crate::mesh::{Elimination, FineSkin, TetMesh};
+use crate::mesh::{FineSkin, TetMesh};
 use crate::scene::{self, MeshSource, Programme, SceneError, SceneFile, SkinSource, SmallStrain, build};
 use crate::sim::Model;
-use crate::solve::nested_dissection;
 
 /// The scene that stands in the library itself: the synthetic head.
 pub const DEFAULT_SCENE: &str = include_str!("../fmu/scene.toml");
@@ -132,17 +130,11 @@ fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, E
     let file = parse(text, path)?;
     let mut mesh = mesh_of(text, &file, path, folder)?;
     let (model, _) = build(text, &file, mesh.clone()).map_err(|e| scene_error(path, e))?;
-    mesh.elimination = analyse(&model);
+    mesh.elimination = model.elimination();
     let order = file.order().map_or(String::new(), |order| format!("order = {order}\n"));
     let curved = if file.curved() { "curved = true\n" } else { "" };
     let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n{order}{curved}"));
     Ok(Baked { scene: replaced, mesh: io::encode(&mesh) })
-}
-
-/// The order in which the unknowns of a model are best eliminated.
-fn analyse(model: &Model) -> Option<Elimination> {
-    let pattern = Assembly::new(&model.parts().terms, model.dofs()).K.pattern;
-    Some(Elimination { pattern: pattern.hash(), order: nested_dissection(&pattern)? })
 }
 
 fn read(path: &Path) -> Result<String, Error> {

@@ -16,6 +16,7 @@ mod term;
 mod tet10;
 mod tet4;
 
+pub use crate::mesh::Elimination;
 pub use assemble::Assembly;
 pub use curved::{Curving, curve_midsides};
 pub use difference::{Difference, LARGEST_GROWTH};

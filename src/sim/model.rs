@@ -5,11 +5,11 @@ use sha2::{Digest, Sha256};
 use super::ports::{Layout, table};
 use super::scheme::Scheme;
 use super::skin::Skin;
-use crate::fem::{Dofs, Embedding, Term};
+use crate::fem::{Assembly, Dofs, Elimination, Embedding, Term};
 use crate::math::{Mat3, Vec3, svd};
 use crate::mesh::TetMesh;
 use crate::port::Port;
-use crate::solve::{Rung, Strategy};
+use crate::solve::{Rung, Strategy, nested_dissection};
 
 /// How a bone moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -232,6 +232,11 @@ impl Model {
     /// Whether it moves in modes of vibration; its steps have no derivatives by inputs then.
     pub fn is_reduced(&self) -> bool {
         self.parts.inertia.as_ref().is_some_and(|i| i.reduction.is_some())
+    }
+    /// The order in which its unknowns are best eliminated, to be kept with the mesh; `None` for graphs that have none.
+    pub fn elimination(&self) -> Option<Elimination> {
+        let pattern = Assembly::new(&self.parts.terms, &self.dofs).K.pattern;
+        Some(Elimination { pattern: pattern.hash(), order: nested_dissection(&pattern)? })
     }
     /// What a host reads of the surface.
     pub fn skin(&self) -> &Skin {

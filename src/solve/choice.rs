@@ -1,8 +1,7 @@
 //! Which linear solver a scene gets.
 
 use super::{Cholesky, Gradients, LinearSolver, LinearSystems, MOST_ENTRIES, SolveError, Strategy};
-use crate::fem::Pattern;
-use crate::mesh::Elimination;
+use crate::fem::{Elimination, Pattern};
 
 /// Blocks beyond which a factor is not even analysed: no mesh of that size has one that is small.
 const MOST_ORDERED: usize = 300_000;

@@ -12,9 +12,8 @@ use faer::{Conj, MatMut, Par, Side};
 
 use super::panels::Panels;
 use super::{LinearSolver, Precision, SolveError, elimination};
-use crate::fem::{BlockMatrix, Pattern};
+use crate::fem::{BlockMatrix, Elimination, Pattern};
 use crate::math::Vec3;
-use crate::mesh::Elimination;
 
 /// Most entries of a factor: 12 GB of numbers.
 pub const MOST_ENTRIES: usize = 1_500_000_000;

@@ -3,8 +3,7 @@
 //! Source: George, "Nested dissection of a regular finite element mesh", SIAM J. Numer. Anal. 10(2), 1973; the
 //! multilevel bisection is the crate feral-metis, after Karypis & Kumar, SIAM J. Sci. Comput. 20(1), 1998.
 
-use crate::fem::Pattern;
-use crate::mesh::Elimination;
+use crate::fem::{Elimination, Pattern};
 
 /// New-to-old order of the blocks: the `known` one if it is of this pattern, else [`nested_dissection`].
 pub fn elimination(pattern: &Pattern, known: Option<&Elimination>) -> Option<Vec<u32>> {
