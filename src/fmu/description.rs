@@ -126,8 +126,7 @@ fn co_simulation(xml: &mut Xml, version: FmiVersion, model: &Model) {
         ],
     };
     let mut attributes: Attributes = vec![("modelIdentifier", MODEL_IDENTIFIER.to_owned())];
-    let holds = |name: &&&str| !(model.is_reduced() && name.starts_with("provides"));
-    attributes.extend(claims.iter().filter(holds).map(|&name| (name, "true".to_owned())));
+    attributes.extend(claims.iter().map(|&name| (name, "true".to_owned())));
     if version.is_3() {
         attributes.push(("providesIntermediateUpdate", "true".to_owned()));
     }

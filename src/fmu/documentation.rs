@@ -66,9 +66,7 @@ pub fn documentation(model: &Model, version: FmiVersion, picture: bool) -> Strin
         nodes = mesh.nodes.len(),
         tets = mesh.tets.len(),
         kind = if model.parts().inertia.is_some() { "with inertia" } else { "from equilibrium to equilibrium" },
-        derivatives = if model.is_reduced() {
-            "Scenes in modes have no derivatives by inputs."
-        } else if model.remembers() {
+        derivatives = if model.remembers() {
             "Directional (and in FMI 3.0 adjoint) derivatives of skin, markers and reactions by every input and parameter are those of \
              the last accepted step, the state before it held."
         } else {

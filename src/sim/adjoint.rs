@@ -67,6 +67,9 @@ impl Sim {
         sensitivity: &mut [f64],
     ) -> Result<(), SimError> {
         let model = self.model.clone();
+        if model.is_reduced() {
+            return self.replayed_adjoint(unknowns, seed, knowns, sensitivity);
+        }
         complete(&model, &mut self.state, &self.work);
         let mut wanted = Vec::new();
         let mut n = 0;

@@ -77,9 +77,9 @@ impl Sim {
     /// the inputs at its end, what came before held.
     ///
     /// # Errors
-    /// [`SimError::NoDerivative`] before the first equilibrium, in scenes in modes, and in those with inertia or memory where no
-    /// step of this run led to the state; [`SimError::Port`], [`SimError::Range`], and as for [`Sim::step`] if the stiffness cannot be
-    /// factored. The state does not change.
+    /// [`SimError::NoDerivative`] before the first equilibrium, in scenes with inertia or memory where no step of this run led
+    /// to the state, and in scenes in modes by moduli and pivots; [`SimError::Port`], [`SimError::Range`], and as for
+    /// [`Sim::step`] if the stiffness cannot be factored. The state does not change.
     pub fn directional_derivative(
         &mut self,
         knowns: &[usize],
@@ -89,7 +89,9 @@ impl Sim {
     ) -> Result<(), SimError> {
         let model = self.model.clone();
         super::step::complete(&model, &mut self.state, &self.work);
-        self.sensitivity(&model)?;
+        if !model.is_reduced() {
+            self.sensitivity(&model)?;
+        }
         let mut direction = vec![0.0; model.parts().layout.len()];
         let mut left = seed;
         for &known in knowns {
@@ -105,6 +107,9 @@ impl Sim {
         }
         if !direction.iter().all(|v| v.is_finite()) {
             return Err(SimError::NoDerivative("the seed is not finite".into()));
+        }
+        if model.is_reduced() {
+            return self.replayed(&direction, unknowns, sensitivity);
         }
         let scale = direction.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         if scale == 0.0 {

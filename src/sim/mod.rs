@@ -15,6 +15,7 @@ mod pace;
 mod past;
 mod ports;
 mod recover;
+mod replay;
 mod scheme;
 mod skin;
 mod start;

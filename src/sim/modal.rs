@@ -96,6 +96,29 @@ impl Coordinates {
     }
 }
 
+/// A step that was made: where from and where to, its end and length (s), and the length of the one before.
+#[derive(Debug, Clone)]
+pub(super) struct Last {
+    pub from: Coordinates,
+    pub to: Coordinates,
+    pub t: f64,
+    pub dt: f64,
+    pub dt_before: f64,
+}
+
+impl Last {
+    /// No step yet.
+    pub fn none(model: &Model) -> Last {
+        let still = Coordinates::still(model);
+        Last { from: still.clone(), to: still, t: f64::NAN, dt: 0.0, dt_before: 0.0 }
+    }
+
+    /// Whether it is how `state` came about.
+    pub fn led_to(&self, state: &State) -> bool {
+        self.t == state.t && self.to == state.modal
+    }
+}
+
 impl Modal {
     /// The step to the causes of `map.q`, from `from` into `next`; returns the kinetic energy, J.
     fn move_on(&mut self, model: &Model, from: &Coordinates, dt: f64, dt_before: f64) -> f64 {
@@ -254,6 +277,9 @@ pub(super) fn advance(
         return Err(SimError::Solve { t: state.t, dt, cuts: 1, spent: 0, source });
     }
     let before = worst_jump(model, &state.config.x);
+    modal.last.from.copy_from(from);
+    modal.last.to.copy_from(&modal.next);
+    (modal.last.t, modal.last.dt, modal.last.dt_before) = (state.t + dt, dt, state.motion.dt);
     state.modal.copy_from(&modal.next);
     state.config.poses.copy_from_slice(&modal.config.poses);
     modal.map.place_seen(model, &state.inputs, &modal.pivots, &mut state.config);
@@ -311,6 +337,7 @@ pub(super) fn set_off(
 ) -> Result<(), SimError> {
     prepare(model, state, minimiser, modal)?;
     let modal = modal.as_mut().expect("tables were made");
+    modal.last.t = f64::NAN;
     // p'' = lambda sigma of the loads where nothing moves.
     place_bones(model, &state.inputs, &mut modal.config);
     modal.map.set(model, &state.inputs, &modal.config.poses);

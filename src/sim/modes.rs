@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 
 use super::SimError;
 use super::linear_map::{Builder, Cause, Column, LinearMap, Reaction, causes};
-use super::modal::Coordinates;
+use super::modal::{Coordinates, Last};
 use super::model::{Drive, Model};
 use super::scheme::Scheme;
 use crate::fem::Configuration;
@@ -88,6 +88,8 @@ pub(super) struct Modal {
     /// Whether it was said that steps resolve more than the modes hold.
     pub(super) told: bool,
     pub(super) next: Coordinates,
+    /// The last step, so that it can be taken again for its derivatives.
+    pub(super) last: Last,
     /// The causes as the inputs ask for them.
     pub(super) asked: Vec<f64>,
     /// What elastic forces feel of causes and modes beside the table: damping, and loads not yet followed.
@@ -176,6 +178,7 @@ impl Modal {
             spectrum: Spectrum::new(&found, n_modes, &m),
             told: false,
             next: Coordinates::still(model),
+            last: Last::none(model),
             asked: vec![0.0; causes.len()],
             change: vec![0.0; causes.len() + n_modes],
             w: vec![0.0; causes.len() + n_modes],

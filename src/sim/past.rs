@@ -34,11 +34,6 @@ impl Past {
         if !model.remembers() {
             return Ok(nothing);
         }
-        if model.is_reduced() {
-            let why =
-                "the scene moves in modes, whose steps have no derivatives by inputs: leave `modes` of [inertia] out";
-            return Err(SimError::NoDerivative(why.into()));
-        }
         let Some((piece, history, x_tilde)) = work.piece_to(state) else {
             let why = "the scene has inertia or tissue with a memory, and what came before this state is not known any more: \
                        make a step, or set out from an equilibrium";

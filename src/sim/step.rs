@@ -159,6 +159,11 @@ impl Workspace {
         &self.minimiser
     }
 
+    /// The minimiser and the tables of a scene in modes.
+    pub fn modal(&mut self) -> (&mut Minimiser, &mut Option<Box<Modal>>) {
+        (&mut self.minimiser, &mut self.modal)
+    }
+
     /// The piece of time that led to `state`, if that was the last one here, with what terms remembered before it and where
     /// inertia alone would have carried the nodes.
     pub fn piece_to(&self, state: &State) -> Option<(Piece, &[f64], &[Vec3])> {

@@ -382,9 +382,80 @@ fn what_modes_leave_out_is_told() {
     slow.initialise().expect("a start");
     assert!(slow.step(0.1).expect("a long step").warnings.is_empty());
     assert!(sim(&scene("", "")).spectrum().expect("none").is_none());
-    let (known, unknown) = (port(&slow, "load.force"), port(&slow, "marker.position"));
-    let refused = slow.directional_derivative(&[known], &[1.0, 0.0, 0.0], &[unknown], &mut [0.0; 3]);
-    assert!(refused.expect_err("modes have no derivatives").to_string().contains("modes"));
+}
+
+/// Directional derivative of all outputs that have one, by the inputs of `names` along seeds of about their size in life.
+fn derivative(sim: &mut Sim, names: &[&str], seed: &[f64]) -> Vec<f64> {
+    let knowns: Vec<usize> = names.iter().map(|name| port(sim, name)).collect();
+    let unknowns = OUT[..5].iter().map(|(name, _)| port(sim, name)).collect::<Vec<_>>();
+    let mut out = vec![0.0; unknowns.iter().map(|&p| sim.model().ports()[p].len()).sum()];
+    sim.directional_derivative(&knowns, seed, &unknowns, &mut out).expect("a derivative");
+    out
+}
+
+#[test]
+fn derivatives_of_steps_in_all_modes_are_those_of_the_full_dynamics() {
+    let inputs = ["bone.translation", "bone.rotation", "load.force", "gravity"];
+    for scheme in SCHEMES {
+        let full = scene("", &format!("{scheme}{DAMPED}"));
+        let (mut modal, mut full) = (sim(&format!("{full}{}", modes(UNKNOWNS))), sim(&full));
+        for sim in [&mut modal, &mut full] {
+            sim.initialise().expect("a start");
+            (0..6).for_each(|k| go(sim, k));
+        }
+        let state = modal.save();
+        let mut random = Random(3);
+        for input in inputs {
+            let seed: Vec<f64> = get(&modal, input).iter().map(|_| random.number()).collect();
+            let (a, b) = (derivative(&mut modal, &[input], &seed), derivative(&mut full, &[input], &seed));
+            let mut first = 0;
+            for (name, _) in &OUT[..5] {
+                let n = get(&modal, name).len();
+                let (a, b) = (&a[first..first + n], &b[first..first + n]);
+                let (off, scale) = (largest(a.iter().zip(b).map(|(a, b)| a - b)), largest(b.iter().copied()));
+                assert!(off <= 1e-6 * scale, "{scheme} d {name} / d {input}: off by {off:.1e} of {scale:.1e}");
+                first += n;
+            }
+        }
+        // The adjoint is the transpose.
+        let seed: Vec<f64> = inputs.iter().flat_map(|name| get(&modal, name)).map(|_| random.number()).collect();
+        let Jv = derivative(&mut modal, &inputs, &seed);
+        let w: Vec<f64> = Jv.iter().map(|v| v + 0.1 * random.number()).collect();
+        let knowns = inputs.map(|name| port(&modal, name));
+        let unknowns: Vec<usize> = OUT[..5].iter().map(|(name, _)| port(&modal, name)).collect();
+        let mut JTw = vec![0.0; seed.len()];
+        modal.adjoint_derivative(&unknowns, &w, &knowns, &mut JTw).expect("an adjoint");
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (one, other) = (dot(&w, &Jv), dot(&JTw, &seed));
+        assert!((one - other).abs() <= 1e-7 * dot(&Jv, &Jv), "{scheme}: <w, Jv> = {one:e}, <J'w, v> = {other:e}");
+        assert_eq!(modal.save(), state, "asking changes nothing");
+        go(&mut modal, 7);
+        go(&mut full, 7);
+        let (off, what) = apart(&modal, &full);
+        assert!(off <= 1.0, "after asking {what}");
+    }
+}
+
+#[test]
+fn derivatives_that_modes_do_not_have_are_told_why() {
+    let mut sim = sim(&scene("", &modes(4)));
+    let unknown = port(&sim, "marker.position");
+    let ask = |sim: &mut Sim, name: &str| {
+        let known = port(sim, name);
+        let seed = vec![1.0; get(sim, name).len()];
+        sim.directional_derivative(&[known], &seed, &[unknown], &mut [0.0; 3]).map_err(|e| e.to_string())
+    };
+    assert!(ask(&mut sim, "gravity").unwrap_err().contains("no equilibrium yet"));
+    sim.initialise().expect("a start");
+    ask(&mut sim, "gravity").expect("of the equilibrium");
+    go(&mut sim, 0);
+    let state = sim.save();
+    go(&mut sim, 1);
+    ask(&mut sim, "gravity").expect("of a step");
+    assert!(ask(&mut sim, "material.all.E").unwrap_err().contains("change the modes"));
+    assert!(ask(&mut sim, "bone.pivot").unwrap_err().contains("change the modes"));
+    sim.restore(&state).expect("its own state");
+    assert!(ask(&mut sim, "gravity").unwrap_err().contains("not known any more"));
 }
 
 #[test]
