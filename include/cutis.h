@@ -73,7 +73,8 @@ typedef enum CutisStatus {
 
 // A face that moves: the scene, where it stands, and the solver's memory.
 //
-// Every function may be called from any thread, on one handle by one thread at a time; handles are independent.
+// Every function may be called from any thread, on one handle by one thread at a time; handles are independent. A handle
+// starts a thread only where its scene asks for one (`[solver] threads`, `background`), and ends it when it is freed.
 typedef struct CutisSim CutisSim;
 
 // A saved state of a simulation; it is never changed, so any number of threads may restore from it.

@@ -76,7 +76,8 @@ pub enum CutisCausality {
 
 /// A face that moves: the scene, where it stands, and the solver's memory.
 ///
-/// Every function may be called from any thread, on one handle by one thread at a time; handles are independent.
+/// Every function may be called from any thread, on one handle by one thread at a time; handles are independent. A handle
+/// starts a thread only where its scene asks for one (`[solver] threads`, `background`), and ends it when it is freed.
 pub struct CutisSim {
     // A `Handle<Inner>`, which callers and tools that compare interfaces need not see.
     _opaque: [u8; 0],
