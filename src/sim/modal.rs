@@ -77,10 +77,18 @@ impl Coordinates {
         lengths(self) == lengths(other)
     }
 
-    fn is_still(&self) -> bool {
+    fn numbers(&self) -> impl Iterator<Item = &f64> {
         let vectors = self.p.iter().chain(&self.v).chain(self.memory.as_flattened()).chain(&self.p_before);
         let numbers = self.q.iter().chain(&self.q_before).chain(&self.rate).chain(&self.pace);
-        vectors.flatten().chain(numbers).all(|c| *c == 0.0)
+        vectors.flatten().chain(numbers)
+    }
+
+    fn is_still(&self) -> bool {
+        self.numbers().all(|c| *c == 0.0)
+    }
+
+    pub fn is_finite(&self) -> bool {
+        self.numbers().all(|c| c.is_finite())
     }
 
     fn copy_from(&mut self, other: &Coordinates) {

@@ -94,6 +94,9 @@ pub enum StateError {
     /// The checksum does not match.
     #[error("the saved state is damaged: its checksum does not match its content")]
     Checksum,
+    /// A position, velocity or memory that no step leads to.
+    #[error("the saved state holds numbers that are not finite: no simulation has written it")]
+    NotFinite,
     /// It ends too early.
     #[error("the saved state is cut short: {0}")]
     Truncated(#[from] Truncated),
@@ -149,6 +152,22 @@ impl State {
             && self.history.len() == parts.n_history
             && self.motion.fits(&Motion::still(parts.mesh.nodes.len(), parts.inertia.as_ref()))
             && self.modal.fits(&Coordinates::still(model))
+    }
+
+    /// Whether all that steps make is; inputs are the host's, who may have set anything.
+    fn is_finite(&self) -> bool {
+        let config = |c: &Configuration| {
+            let poses = c.poses.iter().flat_map(|pose| pose.t.iter().chain(pose.R.iter()));
+            c.x.iter().flatten().chain(poses).all(|v| v.is_finite())
+        };
+        let made = |l: &Linearisation| {
+            config(&l.config) && l.x_tilde.iter().flatten().chain(&l.inputs).chain(&l.history).all(|v| v.is_finite())
+        };
+        let moving = self.motion.v.iter().chain(self.motion.memory.as_flattened()).flatten();
+        config(&self.config)
+            && self.modal.is_finite()
+            && moving.chain(&self.history).chain(&self.applied).all(|v| v.is_finite())
+            && self.linearisation.iter().chain(self.upcoming.iter().map(|u| &u.linearisation)).all(|l| made(l))
     }
 
     /// Versioned, checksummed little-endian bytes; readable in another process with the same model.
@@ -237,7 +256,7 @@ impl State {
             _ => Some(Upcoming { linearisation: Arc::new(take_linearisation(&mut r, model)?), solves: r.u32()? }),
         };
         let outputs = Outputs { reaction_force, reaction_torque, iterations, residual, converged, kinetic, dt };
-        Ok(State {
+        let state = State {
             t,
             config,
             partial: false,
@@ -249,7 +268,8 @@ impl State {
             linearisation,
             upcoming,
             outputs,
-        })
+        };
+        if state.is_finite() { Ok(state) } else { Err(StateError::NotFinite) }
     }
 }
 
