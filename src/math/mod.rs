@@ -5,12 +5,14 @@
 pub mod lane;
 mod pose;
 mod psd;
+mod random;
 mod svd;
 mod tensor;
 mod triangle;
 
 pub use pose::{Pose, best_fit, exp_rotation, log_rotation};
 pub use psd::clamp_eigenvalues;
+pub use random::Random;
 pub use svd::{Svd, polar, svd};
 pub use tensor::{cofactor, d2JdF2, outer, skew, vec9};
 pub use triangle::nearest_weights;

@@ -16,7 +16,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::SolveError;
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 
 /// Vectors that join the basis at once: most modes of one frequency that are sure to be found.
 const BLOCK: usize = 4;
@@ -67,7 +67,7 @@ pub fn slowest_modes(
         }
     };
     let most = n.min(MOST.0 * wanted + MOST.1);
-    let mut basis = Basis { V: DMatrix::zeros(n, 0), fresh: Fresh(1) };
+    let mut basis = Basis { V: DMatrix::zeros(n, 0), fresh: Random(1) };
     let mut T = DMatrix::<f64>::zeros(0, 0);
     let mut look_at = wanted;
     let mut added = basis.extend(&DMatrix::zeros(n, BLOCK), 1.0);
@@ -129,7 +129,7 @@ pub fn slowest_modes(
 /// Orthonormal columns, and a source of new ones.
 struct Basis {
     V: DMatrix<f64>,
-    fresh: Fresh,
+    fresh: Random,
 }
 
 impl Basis {
@@ -150,7 +150,7 @@ impl Basis {
     /// Some direction beyond the basis.
     fn another(&mut self) -> DVector<f64> {
         loop {
-            let w = DVector::from_fn(self.V.nrows(), |_, _| self.fresh.number()).normalize();
+            let w = DVector::from_fn(self.V.nrows(), |_, _| 2.0 * self.fresh.number() - 1.0).normalize();
             if let Some(v) = self.beyond(w) {
                 return v;
             }
@@ -168,18 +168,5 @@ impl Basis {
             w /= length;
         }
         Some(w)
-    }
-}
-
-/// Numbers in [-1, 1) that look like chance and are the same each time (SplitMix64; Steele, Lea & Flood, OOPSLA 2014).
-struct Fresh(u64);
-
-impl Fresh {
-    fn number(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 }

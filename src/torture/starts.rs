@@ -3,7 +3,7 @@
 use super::scene::Block;
 use super::trial::{End, Tally, Trial, fail};
 use super::{Case, LAWS, NONE};
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 
 /// Distance from rest that counts as there, m: ten times the tolerance of the solver.
 const AT_REST: f64 = 1e-6;
@@ -83,21 +83,4 @@ fn scramble(law: &str, tally: &mut Tally, jaw: [f64; 3]) -> Result<(), End> {
         }
     }
     if elsewhere.is_empty() { Ok(()) } else { fail(elsewhere.join("; ")) }
-}
-
-/// A small reproducible generator (SplitMix64; Steele, Lea & Flood, OOPSLA 2014).
-struct Random(u64);
-
-impl Random {
-    /// Uniform in [0, 1).
-    fn number(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.number(), self.number(), self.number())
-    }
 }
