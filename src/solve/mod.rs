@@ -79,7 +79,8 @@ pub enum SolveError {
     Inverts,
     /// The modes of vibration were not all found.
     #[error(
-        "{found} of {wanted} modes of vibration were found among {size} directions: ask for other `modes` of [inertia],          or leave them out"
+        "{found} of {wanted} modes of vibration were found among {size} directions: ask for other `modes` of [inertia], \
+         or leave them out"
     )]
     Modes {
         /// Found.
