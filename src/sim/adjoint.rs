@@ -12,14 +12,14 @@
 //!
 //! Source: Griewank & Walther, "Evaluating Derivatives", 2nd ed., 2008, section 15.3, for the implicit function's adjoint.
 
-use super::derivative::{MOST_PASSES, SETTLED, Sensitivity, has_derivative, is_approximate, mismatch, too_strong};
+use super::derivative::{MOST_PASSES, SETTLED, Sensitivity, check_seed, is_approximate, mismatch, too_strong};
 use super::model::{Drive, Model};
 use super::past::Past;
 use super::step::{complete, read_pivots};
 use super::{Sim, SimError};
 use crate::fem::{At, Configuration};
 use crate::math::{Mat3, Pose, Vec3, skew};
-use crate::port::{Slot, Type};
+use crate::port::Slot;
 
 /// Largest motion in a difference of gradients, in sizes of the model.
 const CHANGE: f64 = 1e-6;
@@ -67,24 +67,17 @@ impl Sim {
         sensitivity: &mut [f64],
     ) -> Result<(), SimError> {
         let model = self.model.clone();
-        if model.is_reduced() {
-            return self.replayed_adjoint(unknowns, seed, knowns, sensitivity);
-        }
-        complete(&model, &mut self.state, &self.work);
-        let mut wanted = Vec::new();
-        let mut n = 0;
-        for &known in knowns {
-            let port =
-                self.port(known, Type::Float64, "an input that derivatives can be taken by", |p| p.is_settable())?;
-            wanted.push((port.slot, port.len()));
-            n += port.len();
-        }
+        let wanted = knowns.iter().map(|&known| self.known(known)).collect::<Result<Vec<_>, _>>()?;
+        let n = wanted.iter().map(|(_, range)| range.len()).sum();
         if n != sensitivity.len() {
             return Err(mismatch("sensitivity", n, sensitivity));
         }
-        if !seed.iter().all(|v| v.is_finite()) {
-            return Err(SimError::NoDerivative("the seed is not finite".into()));
+        check_seed(seed)?;
+        if model.is_reduced() {
+            let elements = wanted.into_iter().flat_map(|(_, range)| range);
+            return self.replayed_adjoint(unknowns, seed, elements, sensitivity);
         }
+        complete(&model, &mut self.state, &self.work);
         let parts = model.parts();
         let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
         read_pivots(&model, &self.state.applied, &mut pivots);
@@ -92,7 +85,7 @@ impl Sim {
         let inputs = self.state.applied.clone();
         let mut unknown_ports = Vec::new();
         for &unknown in unknowns {
-            let port = self.port(unknown, Type::Float64, "an output that has derivatives", has_derivative)?;
+            let port = self.unknown(unknown)?;
             unknown_ports.push((port.slot, port.len()));
         }
         let Sensitivity { minimiser, past, .. } = self.sensitivity(&model)?;
@@ -129,11 +122,10 @@ impl Sim {
         q.iter_mut().zip(&weights.x).for_each(|(q, w)| *q += w);
         let contraction = Contraction { place: &place, lambda: &lambda, xi: &xi, q: &q, pivot: &weights.pivot };
         let mut left = sensitivity;
-        for (slot, n) in wanted {
-            let (now, later) = left.split_at_mut(n);
+        for (slot, range) in wanted {
+            let (now, later) = left.split_at_mut(range.len());
             contraction.by(slot, now);
-            let first = parts.layout.first(slot).expect("every settable port lies in the layout");
-            now.iter_mut().zip(&of_inputs[first..]).for_each(|(sum, w)| *sum += w);
+            now.iter_mut().zip(&of_inputs[range]).for_each(|(sum, w)| *sum += w);
             left = later;
         }
         Ok(())

@@ -14,12 +14,15 @@
 //! Source: Oden & Prudhomme, "Estimation of modeling error in computational mechanics", J. Comput. Phys. 182, 2002, for the
 //! linearised equilibrium; the differences are ours.
 
+use std::ops::Range;
+
+use super::linearisation::with_problem;
 use super::past::Past;
 use super::step::{place_bones, read_pivots, read_wrenches, target_increments};
-use super::{Model, Sim, SimError, State};
+use super::{Model, Sim, SimError, SolveError, State};
 use crate::fem::Configuration;
 use crate::math::Vec3;
-use crate::port::{Slot, Type};
+use crate::port::{Port, Slot, Type};
 use crate::solve::{Minimiser, Problem, Strategy};
 
 /// Largest motion in a difference, in sizes of the model: far above round-off, far below what curves the answer.
@@ -95,19 +98,15 @@ impl Sim {
         let mut direction = vec![0.0; model.parts().layout.len()];
         let mut left = seed;
         for &known in knowns {
-            let port =
-                self.port(known, Type::Float64, "an input that derivatives can be taken by", |p| p.is_settable())?;
-            let first = model.parts().layout.first(port.slot).expect("every settable port lies in the layout");
-            let (now, later) = left.split_at_checked(port.len()).ok_or_else(|| mismatch("seed", port.len(), left))?;
-            direction[first..first + now.len()].copy_from_slice(now);
+            let (_, range) = self.known(known)?;
+            let (now, later) = left.split_at_checked(range.len()).ok_or_else(|| mismatch("seed", range.len(), left))?;
+            direction[range].copy_from_slice(now);
             left = later;
         }
         if !left.is_empty() {
             return Err(mismatch("seed", 0, left));
         }
-        if !direction.iter().all(|v| v.is_finite()) {
-            return Err(SimError::NoDerivative("the seed is not finite".into()));
-        }
+        check_seed(&direction)?;
         if model.is_reduced() {
             return self.replayed(&direction, unknowns, sensitivity);
         }
@@ -124,7 +123,7 @@ impl Sim {
         let Sides(sides) = self.sides(&model, &direction, h, MOST_PASSES)?;
         let mut left = sensitivity;
         for &unknown in unknowns {
-            let port = self.port(unknown, Type::Float64, "an output that has derivatives", has_derivative)?;
+            let port = self.unknown(unknown)?;
             let n = port.len();
             if n > left.len() {
                 return Err(mismatch("sensitivity", n, left));
@@ -179,18 +178,30 @@ impl Sim {
         Err(too_strong())
     }
 
+    /// An input that derivatives can be taken by, and where it lies among all inputs.
+    pub(super) fn known(&self, k: usize) -> Result<(Slot, Range<usize>), SimError> {
+        let port = self.port(k, Type::Float64, "an input that derivatives can be taken by", |p| p.is_settable())?;
+        let first = self.model.parts().layout.first(port.slot).expect("every settable port lies in the layout");
+        Ok((port.slot, first..first + port.len()))
+    }
+
+    /// An output that has derivatives, or an input.
+    pub(super) fn unknown(&self, k: usize) -> Result<&Port, SimError> {
+        self.port(k, Type::Float64, "an output that has derivatives", has_derivative)
+    }
+
     /// The factor at the accepted state, and its past; made where the last one was another's.
     pub(super) fn sensitivity(&mut self, model: &Model) -> Result<&mut Sensitivity, SimError> {
         let here = &self.state;
-        if !here.outputs.converged {
-            let why = "there is no equilibrium yet: initialise, or make a step";
-            return Err(SimError::NoDerivative(why.into()));
-        }
-        let past = Past::of(model, here, &self.work)?;
-        let serves = |s: &Sensitivity| s.config == here.config && s.inputs == here.applied && s.past.is_same(&past);
+        check_settled(here)?;
+        let piece = Past::piece(model, here, &self.work)?;
+        let serves = |s: &Sensitivity| s.config == here.config && s.inputs == here.applied && s.past.is_of(&piece);
         let made = match self.sensitivity.take() {
             Some(kept) if serves(&kept) => kept,
-            other => Box::new(Sensitivity::new(model, here, past, other.map(|other| other.minimiser))?),
+            other => {
+                let past = Past::new(model, piece, &self.work);
+                Box::new(Sensitivity::new(model, here, past, other.map(|other| other.minimiser))?)
+            }
         };
         Ok(self.sensitivity.insert(made))
     }
@@ -210,24 +221,16 @@ pub(super) fn too_strong() -> SimError {
 impl Sensitivity {
     /// Factors the stiffness at `state`, on the pattern of `before` if there is one.
     fn new(model: &Model, state: &State, past: Past, before: Option<Minimiser>) -> Result<Sensitivity, SimError> {
-        let parts = model.parts();
-        let mut pivots = vec![Vec3::zeros(); parts.bones.len()];
-        read_pivots(model, &state.applied, &mut pivots);
-        let mut wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
-        read_wrenches(model, &state.applied, &mut wrenches);
-        let problem = Problem {
-            terms: &parts.terms,
-            dofs: model.dofs(),
-            X: &parts.mesh.nodes,
-            pivots: &pivots,
-            wrenches: &wrenches,
-            at: past.at(model, &state.applied, &past.x_tilde),
-        };
-        let mut minimiser = match before {
-            Some(minimiser) => minimiser,
-            None => Minimiser::new(&problem, Strategy { memory: 0, threads: 1, ..parts.strategy })?,
-        };
-        minimiser.linearise(&problem, &state.config)?;
+        let strategy = Strategy { memory: 0, threads: 1, ..model.parts().strategy };
+        let at = past.at(model, &state.applied, &past.x_tilde);
+        let minimiser = with_problem(model, at, |problem| {
+            let mut minimiser = match before {
+                Some(minimiser) => minimiser,
+                None => Minimiser::new(problem, strategy)?,
+            };
+            minimiser.linearise(problem, &state.config)?;
+            Ok::<_, SolveError>(minimiser)
+        })?;
         Ok(Sensitivity { minimiser, config: state.config.clone(), inputs: state.applied.clone(), past })
     }
 }
@@ -257,7 +260,19 @@ pub(super) fn mismatch(name: &str, wanted: usize, found: &[f64]) -> SimError {
     SimError::Range { name: name.into(), len: found.len(), offset: 0, end: wanted }
 }
 
-pub(super) fn has_derivative(port: &crate::port::Port) -> bool {
+/// Before the first equilibrium nothing can be differentiated.
+pub(super) fn check_settled(state: &State) -> Result<(), SimError> {
+    let why = "there is no equilibrium yet: initialise, or make a step";
+    if state.outputs.converged { Ok(()) } else { Err(SimError::NoDerivative(why.into())) }
+}
+
+/// Seeds are numbers.
+pub(super) fn check_seed(seed: &[f64]) -> Result<(), SimError> {
+    let finite = seed.iter().all(|v| v.is_finite());
+    if finite { Ok(()) } else { Err(SimError::NoDerivative("the seed is not finite".into())) }
+}
+
+fn has_derivative(port: &Port) -> bool {
     use Slot::{BoneReactionForce, BoneReactionTorque, MarkerPosition, SkinPosition, SkinVelocity};
     let is_one =
         matches!(port.slot, SkinPosition | SkinVelocity | MarkerPosition | BoneReactionForce | BoneReactionTorque);
@@ -276,14 +291,10 @@ fn read(model: &Model, past: &Past, sides: &[Held; 2], slot: Slot, direction: &[
     match slot {
         Slot::SkinPosition => rows(&|k, side| model.skin().of(k, &side.config.x), out),
         Slot::SkinVelocity => {
-            let rates = past.rates(model.dofs());
-            let v = sides
-                .each_ref()
-                .map(|side| -> Vec<Vec3> { side.config.x.iter().zip(&rates).map(|(x, rate)| *rate * x).collect() });
-            for (k, out) in out.chunks_exact_mut(3).enumerate() {
-                let [plus, minus] = v.each_ref().map(|v| model.skin().of(k, v));
-                out.copy_from_slice(((plus - minus) / (2.0 * h)).as_slice());
-            }
+            let moved = sides[0].config.x.iter().zip(&sides[1].config.x);
+            let v: Vec<Vec3> =
+                moved.zip(past.rates(model.dofs())).map(|((p, m), rate)| rate / (2.0 * h) * (p - m)).collect();
+            model.skin().gather(&v, 0, out);
         }
         Slot::MarkerPosition => rows(
             &|k, side| {

@@ -7,6 +7,7 @@ mod adjoint;
 mod ahead;
 mod derivative;
 mod linear_map;
+mod linearisation;
 mod modal;
 mod model;
 mod modes;

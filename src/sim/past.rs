@@ -19,40 +19,36 @@ pub(super) struct Past {
 }
 
 impl Past {
-    /// The past of `state`.
+    /// The piece of time that led to `state`; one of no number where the scene has no memory.
     ///
     /// # Errors
     /// [`SimError::NoDerivative`] where it matters and is no longer known.
-    pub fn of(model: &Model, state: &State, work: &Workspace) -> Result<Past, SimError> {
-        let nothing = Past {
-            piece: Piece { number: 0, t: state.t, dt: 0.0, dt_before: 0.0 },
-            history: Vec::new(),
-            x_tilde: Vec::new(),
-            rates: [0.0; 2],
-            follows: 0.0,
-        };
+    pub fn piece(model: &Model, state: &State, work: &Workspace) -> Result<Piece, SimError> {
         if !model.remembers() {
-            return Ok(nothing);
+            return Ok(Piece { number: 0, t: state.t, dt: 0.0, dt_before: 0.0 });
         }
-        let Some((piece, history, x_tilde)) = work.piece_to(state) else {
-            let why = "the scene has inertia or tissue with a memory, and what came before this state is not known any more: \
-                       make a step, or set out from an equilibrium";
-            return Err(SimError::NoDerivative(why.into()));
-        };
-        let past = Past { piece, history: history.to_vec(), x_tilde: x_tilde.to_vec(), ..nothing };
-        Ok(match model.parts().inertia.as_ref().filter(|_| piece.dt > 0.0) {
-            None => past,
-            Some(inertia) => {
-                let formula = inertia.scheme.formula(piece.dt, piece.dt_before);
-                let rates = [false, true].map(|of_bone| formula.rate(of_bone));
-                Past { rates, follows: formula.follows_bone(inertia.damping_mass), ..past }
-            }
-        })
+        let why = "the scene has inertia or tissue with a memory, and what came before this state is not known any more: \
+                   make a step, or set out from an equilibrium";
+        work.piece_to(state).ok_or_else(|| SimError::NoDerivative(why.into()))
     }
 
-    /// Whether both are of one piece of time, or of none.
-    pub fn is_same(&self, other: &Past) -> bool {
-        self.piece.number == other.piece.number
+    /// The past of that piece.
+    pub fn new(model: &Model, piece: Piece, work: &Workspace) -> Past {
+        let inertia = model.parts().inertia.as_ref().filter(|_| piece.dt > 0.0);
+        let formula = inertia.map(|i| (i.scheme.formula(piece.dt, piece.dt_before), i.damping_mass));
+        let (history, x_tilde) = work.before_last();
+        Past {
+            piece,
+            history: history.to_vec(),
+            x_tilde: x_tilde.to_vec(),
+            rates: [false, true].map(|of_bone| formula.map_or(0.0, |(formula, _)| formula.rate(of_bone))),
+            follows: formula.map_or(0.0, |(formula, damping)| formula.follows_bone(damping)),
+        }
+    }
+
+    /// Whether it is that of this piece.
+    pub fn is_of(&self, piece: &Piece) -> bool {
+        self.piece.number == piece.number
     }
 
     /// What terms see, under these inputs and with nodes carried there by inertia.

@@ -3,12 +3,11 @@
 //! The step is affine in all inputs but turns, so central differences are good to nine digits; the adjoint asks for one input
 //! after another.
 
-use super::derivative::{has_derivative, mismatch};
+use super::derivative::{check_settled, mismatch};
 use super::modal::{self, Last};
 use super::step::Workspace;
 use super::{Model, Sim, SimError, State, View};
 use crate::fem::Strain;
-use crate::port::Type;
 
 /// Largest change of an input in a difference, in its SI unit.
 const CHANGE: f64 = 1e-5;
@@ -23,7 +22,7 @@ impl Sim {
     ) -> Result<(), SimError> {
         let mut n = 0;
         for &unknown in unknowns {
-            n += self.port(unknown, Type::Float64, "an output that has derivatives", has_derivative)?.len();
+            n += self.unknown(unknown)?.len();
         }
         if n != sensitivity.len() {
             return Err(mismatch("sensitivity", n, sensitivity));
@@ -50,30 +49,17 @@ impl Sim {
         Ok(())
     }
 
-    /// As [`Sim::adjoint_derivative`].
+    /// As [`Sim::adjoint_derivative`], by these elements of all inputs.
     pub(super) fn replayed_adjoint(
         &mut self,
         unknowns: &[usize],
         seed: &[f64],
-        knowns: &[usize],
+        elements: impl Iterator<Item = usize>,
         sensitivity: &mut [f64],
     ) -> Result<(), SimError> {
-        let mut elements = Vec::new();
-        for &known in knowns {
-            let port =
-                self.port(known, Type::Float64, "an input that derivatives can be taken by", |p| p.is_settable())?;
-            let first = self.model.parts().layout.first(port.slot).expect("every settable port lies in the layout");
-            elements.extend(first..first + port.len());
-        }
-        if elements.len() != sensitivity.len() {
-            return Err(mismatch("sensitivity", elements.len(), sensitivity));
-        }
-        if !seed.iter().all(|v| v.is_finite()) {
-            return Err(SimError::NoDerivative("the seed is not finite".into()));
-        }
         let mut column = vec![0.0; seed.len()];
         let mut direction = vec![0.0; self.state.applied.len()];
-        for (k, out) in elements.into_iter().zip(sensitivity) {
+        for (k, out) in elements.zip(sensitivity) {
             direction[k] = 1.0;
             self.replayed(&direction, unknowns, &mut column)?;
             direction[k] = 0.0;
@@ -86,9 +72,7 @@ impl Sim {
 /// The state that the last step would have led to from the same past under other inputs.
 fn again(model: &Model, state: &State, work: &mut Workspace, inputs: Vec<f64>) -> Result<State, SimError> {
     let refused = |why: &str| Err(SimError::NoDerivative(why.into()));
-    if !state.outputs.converged {
-        return refused("there is no equilibrium yet: initialise, or make a step");
-    }
+    check_settled(state)?;
     let (minimiser, modal) = work.modal();
     let Some(made) = modal.as_mut().filter(|modal| modal.last.led_to(state)) else {
         return refused(

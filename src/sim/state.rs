@@ -4,26 +4,13 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
+use super::linearisation::Linearisation;
 use super::modal::Coordinates;
 use super::model::Model;
 use super::motion::Motion;
 use crate::bytes::{Reader, Truncated, Writer};
 use crate::fem::Configuration;
 use crate::math::{Mat3, Pose, Vec3};
-
-/// Where and how the kept stiffness was factored. Part of the state, so that a restored simulation repeats its bits.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Linearisation {
-    pub config: Configuration,
-    pub t: f64,
-    pub dt: f64,
-    /// Length of the piece of time before, s.
-    pub dt_before: f64,
-    pub inputs: Vec<f64>,
-    pub history: Vec<f64>,
-    /// Empty in quasi-static scenes.
-    pub x_tilde: Vec<Vec3>,
-}
 
 /// A linearisation at an accepted state that is taken up once its factor has had the time to be made beside the steps.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::ahead::Ahead;
 use super::linear_map::LinearMap;
+use super::linearisation::{Linearisation, with_problem};
 use super::modal;
 use super::model::{Drive, Model};
 use super::modes::{Modal, Spectrum};
@@ -15,7 +16,7 @@ use super::pace::{Pace, even_part};
 use super::recover::untangle;
 use super::scheme::Scheme;
 use super::start::accelerations;
-use super::state::{Linearisation, State, Upcoming};
+use super::state::State;
 use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
 use crate::math::{Mat3, Pose, Vec3, best_fit};
@@ -40,8 +41,6 @@ const MODULUS_DRIFT: f64 = 0.1;
 const LARGEST_JUMP: f64 = 0.3;
 /// The bones' common rigid motion is taken out first where it explains all but this part of their motion.
 const RIGID_REMAINDER: f64 = 0.5;
-/// Linear solves of a piece from which on a factor is due that is made beside the steps.
-const STALE: u32 = 6;
 /// Turns smaller than this (rad, squared) leave the factor as it is.
 const FRAME_THRESHOLD: f64 = 0.05 * 0.05;
 
@@ -164,11 +163,14 @@ impl Workspace {
         (&mut self.minimiser, &mut self.modal)
     }
 
-    /// The piece of time that led to `state`, if that was the last one here, with what terms remembered before it and where
-    /// inertia alone would have carried the nodes.
-    pub fn piece_to(&self, state: &State) -> Option<(Piece, &[f64], &[Vec3])> {
-        let piece = self.last.filter(|piece| piece.t == state.t && self.config == state.config)?;
-        Some((piece, &self.remembered, &self.x_tilde))
+    /// The piece of time that led to `state`, if that was the last one here.
+    pub fn piece_to(&self, state: &State) -> Option<Piece> {
+        self.last.filter(|piece| piece.t == state.t && self.config == state.config)
+    }
+
+    /// What terms remembered before the last piece, and where inertia alone would have carried the nodes in it.
+    pub fn before_last(&self) -> (&[f64], &[Vec3]) {
+        (&self.remembered, &self.x_tilde)
     }
 }
 
@@ -236,7 +238,9 @@ pub(super) fn advance(
     work.motion.copy_from(&state.motion);
     work.history.copy_from_slice(&state.history);
     let mut report = StepReport::new(0);
-    let mut linearisation = take_up(model, state, work, &mut report);
+    let taken_up = work.ahead.take_up(model, state, &mut work.minimiser, &mut work.factored);
+    report.factorisations += u32::from(taken_up.is_some());
+    let mut linearisation = taken_up.or_else(|| state.linearisation.clone());
     let pace = Pace::of(model.parts().inertia.as_ref()).filter(|_| dt > 0.0);
     let smallest = if pace.is_some() { Pace::SMALLEST } else { SMALLEST_PIECE };
     let (mut done, mut piece) = (0.0, 1.0);
@@ -304,68 +308,12 @@ pub(super) fn advance(
     state.t += dt;
     accept(model, state, work, &report, dt);
     state.linearisation = linearisation;
-    look_ahead(model, state, work, &report);
+    let piece = work.last.expect("the step had a last piece");
+    let Workspace { ahead, minimiser, config, inputs, remembered, x_tilde, .. } = work;
+    let at = At { t: piece.t, dt: piece.dt, inputs, history: remembered, x_tilde, ..At::NOWHERE };
+    let end = || Linearisation::new(config, &at, piece.dt_before);
+    state.upcoming = ahead.look(model, state.upcoming.take(), &report, minimiser, end);
     Ok(report)
-}
-
-/// The linearisation that the step begins with: the upcoming one once its time has come, else the one at hand.
-fn take_up(
-    model: &Arc<Model>,
-    state: &State,
-    work: &mut Workspace,
-    report: &mut StepReport,
-) -> Option<Arc<Linearisation>> {
-    let Some(upcoming) = &state.upcoming else { return state.linearisation.clone() };
-    if upcoming.solves > 0 {
-        work.ahead.begin(model, &upcoming.linearisation);
-        return state.linearisation.clone();
-    }
-    let made = |factored: &Arc<Linearisation>| Arc::ptr_eq(factored, &upcoming.linearisation);
-    if !work.factored.as_ref().is_some_and(made) {
-        let Ok(minimiser) = work.ahead.finish(model, &upcoming.linearisation) else {
-            return state.linearisation.clone();
-        };
-        let before = std::mem::replace(&mut work.minimiser, minimiser);
-        work.ahead.keep(before);
-        work.factored = Some(upcoming.linearisation.clone());
-    }
-    report.factorisations += 1;
-    Some(upcoming.linearisation.clone())
-}
-
-/// Where a step has taken many solves, a new factor is begun at its end.
-fn look_ahead(model: &Arc<Model>, state: &mut State, work: &mut Workspace, report: &StepReport) {
-    if !model.parts().background || model.is_quadratic() || work.minimiser.factor_len() == 0 {
-        return;
-    }
-    let stale = report.iterations >= STALE * report.substeps;
-    state.upcoming = match (state.upcoming.take(), work.last) {
-        // One that was made within the step is newer, and one that was taken up is no longer to come.
-        (Some(_), _) if report.factorisations > 0 => None,
-        (Some(upcoming), _) => Some(Upcoming { solves: upcoming.solves.saturating_sub(report.iterations), ..upcoming }),
-        (None, Some(piece)) if stale => Some(Upcoming {
-            linearisation: Arc::new(Linearisation {
-                config: work.config.clone(),
-                t: piece.t,
-                dt: piece.dt,
-                dt_before: piece.dt_before,
-                inputs: work.inputs.clone(),
-                history: work.remembered.clone(),
-                x_tilde: work.x_tilde.clone(),
-            }),
-            solves: solves_of_a_factor(&work.minimiser),
-        }),
-        (None, _) => None,
-    };
-    if let Some(upcoming) = &state.upcoming {
-        work.ahead.begin(model, &upcoming.linearisation);
-    }
-}
-
-/// Solves, forces included, that take twice as long as a factorisation, as measured from 1k to 200k tetrahedra: no step is to
-/// wait for one on a machine that has other work, too.
-fn solves_of_a_factor(minimiser: &Minimiser) -> u32 {
-    (0.3 * minimiser.factor_len() as f64 / minimiser.n_unknowns() as f64).ceil() as u32
 }
 
 /// Takes over where `work` has come to.
@@ -600,16 +548,7 @@ fn step_piece(
         *time_error = error;
     }
     if outcome.factorisations > 0 {
-        let made = Linearisation {
-            config: minimiser.factored_at().clone(),
-            t,
-            dt,
-            dt_before: motion.dt,
-            inputs: inputs.clone(),
-            history: history.clone(),
-            x_tilde: x_tilde.clone(),
-        };
-        let made = Arc::new(made);
+        let made = Arc::new(Linearisation::new(minimiser.factored_at(), &at, motion.dt));
         *factored = Some(made.clone());
         *linearisation = Some(made);
     }
@@ -638,14 +577,6 @@ pub(super) fn in_time<'a>(model: &Model, at: At<'a>, dt_before: f64) -> At<'a> {
     }
 }
 
-impl Linearisation {
-    /// What terms saw when it was made.
-    pub(super) fn at(&self, model: &Model) -> At<'_> {
-        let Linearisation { t, dt, inputs, history, x_tilde, .. } = self;
-        in_time(model, At { t: *t, dt: *dt, inputs, history, x_tilde, ..At::NOWHERE }, self.dt_before)
-    }
-}
-
 /// Makes the minimiser's factor the one the state remembers, or a new one at `config` if there is none that serves.
 #[allow(clippy::too_many_arguments)] // the halves of a workspace
 fn restore_factor(
@@ -668,14 +599,13 @@ fn restore_factor(
     };
     let serves = |l: &Linearisation| {
         as_stiff(l)
-            && (model.parts().inertia.is_none() && model.parts().n_history == 0
-                || near(l.dt, dt) && near(l.at(model).inertia.sqrt(), problem.at.inertia.sqrt()))
+            && (!model.remembers() || near(l.dt, dt) && near(l.at(model).inertia.sqrt(), problem.at.inertia.sqrt()))
     };
     if let Some(wanted) = linearisation.as_ref().filter(|l| serves(l)) {
         let same = factored.as_ref().is_some_and(|f| Arc::ptr_eq(f, wanted) || f == wanted);
         if !(same && minimiser.is_factored()) {
             *factored = None;
-            wanted.with_problem(model, |made| minimiser.linearise(made, &wanted.config))?;
+            with_problem(model, wanted.at(model), |made| minimiser.linearise(made, &wanted.config))?;
             *factored = Some(wanted.clone());
         }
         return Ok(());
@@ -683,15 +613,7 @@ fn restore_factor(
     *factored = None;
     minimiser.linearise(problem, config)?;
     report.factorisations += 1;
-    let made = Arc::new(Linearisation {
-        config: config.clone(),
-        t: problem.at.t,
-        dt,
-        dt_before,
-        inputs: problem.at.inputs.to_vec(),
-        history: problem.at.history.to_vec(),
-        x_tilde: problem.at.x_tilde.to_vec(),
-    });
+    let made = Arc::new(Linearisation::new(config, &problem.at, dt_before));
     *factored = Some(made.clone());
     *linearisation = Some(made);
     Ok(())
