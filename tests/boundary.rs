@@ -13,6 +13,7 @@ mod boundary {
     mod importer;
     mod instructions;
     mod layers;
+    mod notices;
     mod symbols;
     mod util;
 }

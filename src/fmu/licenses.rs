@@ -1,9 +1,12 @@
-//! Licenses of everything inside the library, as SPDX.
+//! Licenses of everything inside the library: listed, as SPDX, in full.
 
 use std::fmt::Write;
 
 /// The crates inside the library, one a line: `name vVERSION: LICENSE`.
 pub(super) const LIST: &str = include_str!("../../fmu/third-party.txt");
+
+/// Their texts and copyright lines.
+pub(super) const NOTICES: &str = include_str!("../../fmu/third-party-notices.txt");
 
 /// The list as an SPDX 2.3 document in its tag-value form; `token` makes its name unique.
 pub(super) fn spdx(token: &str) -> String {

@@ -80,6 +80,7 @@ pub fn package(
     archive.add("documentation/licenses/LICENSE-APACHE", 0o644, include_bytes!("../../LICENSE-APACHE"))?;
     archive.add("documentation/licenses/LICENSE-MIT", 0o644, include_bytes!("../../LICENSE-MIT"))?;
     archive.add("documentation/licenses/third-party.txt", 0o644, licenses::LIST.as_bytes())?;
+    archive.add("documentation/licenses/third-party-notices.txt", 0o644, licenses::NOTICES.as_bytes())?;
     archive.add("documentation/licenses/license.spdx", 0o644, licenses::spdx(scene.model.token()).as_bytes())?;
     archive.add("resources/model.cutis", 0o644, &baked.mesh)?;
     archive.add("resources/scene.toml", 0o644, baked.scene.as_bytes())?;
@@ -113,7 +114,8 @@ fn check(binaries: &[Binary]) -> Result<(), PackageError> {
 const LICENSE: &str = "This component is licensed under either of the MIT license (LICENSE-MIT) or the Apache license 2.0 (LICENSE-APACHE),
 at your option. SPDX: MIT OR Apache-2.0
 
-The libraries inside it and their licenses are listed in third-party.txt, and as SPDX in license.spdx.
+The libraries inside it and their licenses are listed in third-party.txt, and as SPDX in license.spdx; their texts stand
+in third-party-notices.txt.
 ";
 
 struct Archive(ZipWriter<Cursor<Vec<u8>>>);

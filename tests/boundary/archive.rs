@@ -45,6 +45,7 @@ fn archives_are_reproducible_small_and_complete() {
             "documentation/licenses/license.txt",
             "documentation/licenses/license.spdx",
             "documentation/licenses/third-party.txt",
+            "documentation/licenses/third-party-notices.txt",
             "resources/scene.toml",
             "resources/model.cutis",
         ] {
