@@ -54,6 +54,10 @@ pub enum Slot {
     EnergyElastic,
     /// Kinetic energy (scenes with inertia).
     EnergyKinetic,
+    /// Force on each contact's shape.
+    ContactForce,
+    /// How deep the surface lies in each contact's shape.
+    ContactDepth,
     /// Smallest det F.
     MinDetF,
     /// Largest principal stretch.

@@ -9,6 +9,8 @@ mod bench;
 mod common;
 #[path = "verify/compare.rs"]
 mod compare;
+#[path = "verify/contact.rs"]
+mod contact;
 #[path = "verify/derivatives.rs"]
 mod derivatives;
 #[path = "verify/elimination.rs"]

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case)]
 
+mod contact;
 mod damage;
 mod fibre;
 mod graded;
@@ -14,11 +15,13 @@ mod nodal_pressure;
 mod pressure;
 mod prestress;
 mod rayleigh;
+mod shape;
 mod springs;
 mod tissue;
 mod tuned;
 mod viscous;
 
+pub use contact::Contact;
 pub use damage::{Damaged, Softening};
 pub use fibre::Fibre;
 pub use graded::Graded;
@@ -31,6 +34,7 @@ pub use nodal_pressure::{NodalPressure, Volume};
 pub use pressure::Pressure;
 pub use prestress::{Balance, Prestress};
 pub use rayleigh::{damping_memory, stiffness_damping};
+pub use shape::{Distance, Shape};
 pub use springs::{Spring, Springs, springs};
 pub use tissue::{Branches, Elements, LAWS, Law, law};
 pub use tuned::{Tuned, Tuning};

@@ -26,6 +26,6 @@ pub use locate::{Found, Locator};
 pub use matrix::{BlockMatrix, CouplingMatrix, Pattern};
 pub use quadratic::{EDGES, add_midsides};
 pub use solid::{Elastic, Material, Point, Solid};
-pub use term::{At, Curvature, HessianSink, Kernel, OnElements, Strain, Term};
+pub use term::{At, Curvature, HessianSink, Kernel, OnElements, Strain, Term, Touch};
 pub use tet4::{TET4_PLACES, tet4_points};
 pub use tet10::{TET10_PLACES, tet10_points};

@@ -75,6 +75,27 @@ impl Strain {
     }
 }
 
+/// How a surface touches a rigid shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Force of the surface on the shape, N.
+    pub force: Vec3,
+    /// Distance of its nearest point, m, or less where all are outside; negative inside.
+    pub gap: f64,
+    /// Depth beyond which a point may be pushed out on the wrong side, m.
+    pub reach: f64,
+}
+
+impl Touch {
+    /// No touch at all.
+    pub const NONE: Touch = Touch { force: Vec3::new(0.0, 0.0, 0.0), gap: f64::INFINITY, reach: f64::INFINITY };
+
+    /// Depth of the deepest point inside it, m; 0 if there is none.
+    pub fn depth(&self) -> f64 {
+        (-self.gap).max(0.0)
+    }
+}
+
 /// Takes the Hessian blocks of one clique of nodes.
 pub trait HessianSink {
     /// Adds the upper triangle of blocks of `nodes`, row by row: (0,0), (0,1), ... (1,1), (1,2), ...
@@ -136,6 +157,11 @@ pub trait Term: Send + Sync {
     /// Strain at `x`, for terms that have elements.
     fn strain(&self, _at: &At, _x: &[Vec3]) -> Strain {
         Strain::NONE
+    }
+
+    /// How it touches at `x`, for terms that are contacts.
+    fn touch(&self, _x: &[Vec3]) -> Option<Touch> {
+        None
     }
 
     /// Whether it remembers something of accepted steps.

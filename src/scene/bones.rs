@@ -8,6 +8,8 @@ use crate::mesh::TetMesh;
 use crate::port::Slot;
 use crate::sim::{self, Bone, Drive, Layout};
 
+/// Says that no tissue sticks to a bone: it carries the shape of a contact only.
+const NO_NODES: &str = "none";
 /// Slack of a box's walls, in sizes of the box.
 const ROUND_OFF: f64 = 1e-9;
 
@@ -20,10 +22,14 @@ impl Builder<'_> {
         let mut bones = Vec::new();
         for spec in specs {
             let wanted = spec.nodes.as_ref().unwrap_or(&spec.name);
-            let set = mesh
-                .node_set(wanted.get_ref())
-                .ok_or_else(|| self.text.unknown("node set", wanted, mesh.node_sets.iter().map(|s| s.name.as_str())))?;
-            let nodes = self.within(spec, &set.nodes, mesh)?;
+            let nodes = match mesh.node_set(wanted.get_ref()) {
+                Some(set) => self.within(spec, &set.nodes, mesh)?,
+                None if wants_no_nodes(spec) => Vec::new(),
+                None => {
+                    let sets = mesh.node_sets.iter().map(|s| s.name.as_str());
+                    return Err(self.text.unknown("node set", wanted, sets.chain([NO_NODES])));
+                }
+            };
             for &a in &nodes {
                 let Some(other) = owner[a as usize].replace(spec.name.get_ref()) else { continue };
                 shared[a as usize] = true;
@@ -72,10 +78,12 @@ impl Builder<'_> {
         Ok(kept)
     }
 
+    /// Start values of the bones' inputs; nodes from `first_of_contacts` on move shapes of contacts.
     pub(super) fn bone_starts(
         &self,
         specs: &[BoneSpec],
         bones: &[Bone],
+        first_of_contacts: u32,
         mesh: &TetMesh,
         layout: &Layout,
         start: &mut [f64],
@@ -86,8 +94,11 @@ impl Builder<'_> {
                     start[first + 3 * b..first + 3 * b + 3].copy_from_slice(&value);
                 }
             };
-            let centroid =
-                bone.nodes.iter().map(|&a| mesh.nodes[a as usize]).sum::<Vec3>() / bone.nodes.len().max(1) as f64;
+            let own = match bone.nodes.partition_point(|&a| a < first_of_contacts) {
+                0 => &bone.nodes[..],
+                n => &bone.nodes[..n],
+            };
+            let centroid = own.iter().map(|&a| mesh.nodes[a as usize]).sum::<Vec3>() / own.len().max(1) as f64;
             put(Slot::BonePivot, Some(self.text.triple("bone", "pivot", &spec.pivot)?.unwrap_or(centroid.into())));
             for (slot, key, value, drive) in [
                 (Slot::BoneTranslation, "translation", &spec.translation, Drive::Pose),
@@ -106,6 +117,11 @@ impl Builder<'_> {
         }
         Ok(())
     }
+}
+
+/// Whether a bone is to have no tissue.
+pub(super) fn wants_no_nodes(spec: &BoneSpec) -> bool {
+    spec.nodes.as_ref().is_some_and(|nodes| nodes.get_ref() == NO_NODES)
 }
 
 /// Takes bone nodes within `rings` edges of another bone off their bone.

@@ -62,6 +62,7 @@ impl Builder<'_> {
             muscle,
             load,
             pressure,
+            contact: _,
             marker,
             gravity,
             inertia,
@@ -115,11 +116,17 @@ impl Builder<'_> {
         if rings > 0 {
             free_rings(&mesh, &mut bones, rings, &mut warnings);
         }
+        let first_of_contacts = mesh.nodes.len() as u32;
+        let mut contacts = Vec::new();
+        for (name, contact) in self.contacts(file, &mut mesh, &mut bones, &mut warnings)? {
+            contacts.push(sim::Contact { name, frame: contact.frame });
+            terms.push(Box::new(contact));
+        }
         let counts: Vec<(Drive, usize)> = bones.iter().map(|b| (b.drive, b.nodes.len())).collect();
         let layout = Layout::new(tunable.len(), &counts, muscle.len(), load.len(), pressure.len(), gravity.is_some());
         let mut start = vec![0.0; layout.len()];
         start.iter_mut().zip(&tunable).for_each(|(start, (_, E))| *start = *E);
-        self.bone_starts(bone, &bones, &mesh, &layout, &mut start)?;
+        self.bone_starts(bone, &bones, first_of_contacts, &mesh, &layout, &mut start)?;
 
         let muscles = self.text.names("muscle", muscle.iter().map(|m| &m.name))?;
         for (k, spec) in muscle.iter().enumerate() {
@@ -224,6 +231,7 @@ impl Builder<'_> {
             muscles,
             loads,
             pressures,
+            contacts,
             markers,
             terms,
             stand_in,

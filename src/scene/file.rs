@@ -26,6 +26,8 @@ pub struct SceneFile {
     #[serde(default)]
     pub pressure: Vec<PressureSpec>,
     #[serde(default)]
+    pub contact: Vec<ContactSpec>,
+    #[serde(default)]
     pub marker: Vec<MarkerSpec>,
     pub gravity: Option<GravitySpec>,
     pub inertia: Option<InertiaSpec>,
@@ -263,6 +265,19 @@ pub struct PressureSpec {
     pub at: Option<Triple>,
     pub radius: Option<Spanned<f64>>,
     pub pressure: Option<Spanned<f64>>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactSpec {
+    pub name: Spanned<String>,
+    pub bone: Spanned<String>,
+    pub path: Option<Spanned<Vec<[f64; 3]>>>,
+    pub radius: Option<Spanned<f64>>,
+    pub point: Option<Triple>,
+    pub normal: Option<Triple>,
+    pub faces: Option<Spanned<String>>,
+    pub stiffness: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -8,6 +8,7 @@
 mod bones;
 mod build;
 mod check;
+mod contacts;
 mod depth;
 mod file;
 mod keys;

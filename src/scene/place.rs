@@ -22,11 +22,13 @@ pub fn patch(mesh: &TetMesh, triangles: &[[u32; 3]], p: &Vec3, radius: f64) -> V
 
 /// Share of each node in the area of the triangles; sums to one.
 pub fn area_shares(mesh: &TetMesh, triangles: &[[u32; 3]]) -> Vec<(u32, f64)> {
-    let third = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|a| mesh.nodes[a as usize]);
-        (b - a).cross(&(c - a)).norm() / 6.0
-    };
-    shares(triangles.iter().flat_map(|t| t.map(|a| (a, third(t)))))
+    shares(triangles.iter().flat_map(|t| t.map(|a| (a, area(mesh, t) / 3.0))))
+}
+
+/// Area of a triangle, m2.
+pub fn area(mesh: &TetMesh, triangle: &[u32; 3]) -> f64 {
+    let [a, b, c] = triangle.map(|a| mesh.nodes[a as usize]);
+    0.5 * (b - a).cross(&(c - a)).norm()
 }
 
 /// Share of each node in the volume of the tetrahedra of `region`; sums to one.

@@ -1,7 +1,7 @@
 //! What a host sets and gets. Both are copies: nothing is solved, nothing is allocated.
 
 use super::{Model, Sim, SimError, State};
-use crate::fem::Strain;
+use crate::fem::{Strain, Touch};
 use crate::math::{Vec3, log_rotation};
 use crate::port::{Port, Slot, Type};
 
@@ -117,6 +117,10 @@ impl View<'_> {
             Slot::MarkerPosition => rows(|k| self.marker(k, &self.state.config.x), offset, out),
             Slot::BoneReactionForce => rows(|k| o.reaction_force[k], offset, out),
             Slot::BoneReactionTorque => rows(|k| o.reaction_torque[k], offset, out),
+            Slot::ContactForce => rows(|k| self.touch(k).force, offset, out),
+            Slot::ContactDepth => {
+                out.iter_mut().zip(offset..).for_each(|(out, k)| *out = self.touch(k).depth());
+            }
             Slot::BonePoseTranslation => rows(|k| self.state.config.poses[k].t, offset, out),
             Slot::BonePoseRotation => rows(|k| log_rotation(&self.state.config.poses[k].R), offset, out),
             Slot::SolverResidual => out.fill(o.residual),
@@ -181,6 +185,13 @@ impl View<'_> {
         check_range(p, offset, out.len())?;
         out.fill(self.state.outputs.converged);
         Ok(())
+    }
+
+    /// How contact `k` touches.
+    fn touch(&self, k: usize) -> Touch {
+        let x = &self.state.config.x;
+        let mut touches = self.model.parts().terms.iter().filter_map(|term| term.touch(x));
+        touches.nth(k).unwrap_or(Touch::NONE)
     }
 
     /// A nodal field at a marker.

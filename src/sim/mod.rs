@@ -5,6 +5,7 @@
 mod access;
 mod adjoint;
 mod ahead;
+mod approach;
 mod derivative;
 mod linear_map;
 mod linearisation;
@@ -24,7 +25,9 @@ mod state;
 mod step;
 
 pub use access::View;
-pub use model::{Bone, Drive, Inertia, Marker, Model, ModelParts, Reduction, StandIn, Unconstrained, osteotomy_edges};
+pub use model::{
+    Bone, Contact, Drive, Inertia, Marker, Model, ModelParts, Reduction, StandIn, Unconstrained, osteotomy_edges,
+};
 pub use modes::Spectrum;
 pub use ports::Layout;
 pub(crate) use ports::MOST_TUNABLE;

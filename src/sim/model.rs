@@ -57,6 +57,15 @@ pub struct Marker {
     pub weights: [f64; 3],
 }
 
+/// A rigid shape that a bone carries and the tissue cannot enter.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Contact {
+    /// Name, unique among the contacts.
+    pub name: String,
+    /// Nodes of the bone that move it.
+    pub frame: [u32; 4],
+}
+
 /// Dynamics: nodal masses and how time starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inertia {
@@ -106,6 +115,8 @@ pub struct ModelParts {
     pub loads: Vec<String>,
     /// Names of the pressure loads, in order.
     pub pressures: Vec<String>,
+    /// Contacts, in the order of their terms.
+    pub contacts: Vec<Contact>,
     /// Markers, in order.
     pub markers: Vec<Marker>,
     /// The summands of the energy.
@@ -304,7 +315,10 @@ fn check_held(parts: &ModelParts, dofs: &Dofs) -> Result<(), Unconstrained> {
     for &a in &dofs.prescribed {
         held.entry(roots[a as usize]).or_default().push(parts.mesh.nodes[a as usize]);
     }
-    let loose: Vec<_> = size.iter().filter(|(root, _)| !spans_a_plane(held.get(root))).collect();
+    // Nodes that move the shape of a contact are held one by one.
+    let all_held = |root: &u32, nodes: usize| held.get(root).is_some_and(|held| held.len() == nodes);
+    let is_loose = |root: &u32, nodes: usize| !all_held(root, nodes) && !spans_a_plane(held.get(root));
+    let loose: Vec<_> = size.iter().filter(|(root, (nodes, _))| is_loose(root, *nodes)).collect();
     let Some((root, (nodes, sum))) = loose.iter().max_by_key(|(_, (nodes, _))| *nodes) else {
         return Ok(());
     };

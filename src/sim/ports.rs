@@ -99,6 +99,8 @@ fn reference(slot: Slot) -> u32 {
         Slot::BoneReactionTorque => 121,
         Slot::BonePoseTranslation => 122,
         Slot::BonePoseRotation => 123,
+        Slot::ContactForce => 130,
+        Slot::ContactDepth => 131,
         Slot::SolverIterations => 200,
         Slot::SolverResidual => 201,
         Slot::SolverConverged => 202,
@@ -308,6 +310,27 @@ pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Ve
             "Rotation vector each bone has reached",
         );
     }
+    let contacts: Vec<String> = parts.contacts.iter().map(|c| c.name.clone()).collect();
+    add(
+        Slot::ContactForce,
+        "contact.force",
+        Float64,
+        &[contacts.len(), 3],
+        "N",
+        Output,
+        &contacts,
+        "Force that the tissue exerts on each contact's shape; part of the reaction of its bone",
+    );
+    add(
+        Slot::ContactDepth,
+        "contact.depth",
+        Float64,
+        &[contacts.len()],
+        "m",
+        Output,
+        &contacts,
+        "How deep the tissue lies in each contact's shape at most",
+    );
     add(
         Slot::SolverIterations,
         "solver.iterations",

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use super::ahead::Ahead;
+use super::approach::{check_depth, safe_part};
 use super::linear_map::LinearMap;
 use super::linearisation::{Linearisation, with_problem};
 use super::modal;
@@ -247,6 +248,10 @@ pub(super) fn advance(
     if pace.is_some() && state.motion.next_dt > 0.0 {
         piece = even_part(1.0, (state.motion.next_dt / dt).max(smallest));
     }
+    let longest = safe_part(model, &state.inputs, &work.pivots, &mut work.config, &mut work.u).max(smallest);
+    if longest < 1.0 {
+        piece = even_part(1.0, longest.min(piece));
+    }
     let mut spent_before = 0;
     while done < 1.0 {
         let to: f64 = if done + piece >= 1.0 - ROUND_OFF { 1.0 } else { done + piece };
@@ -270,6 +275,9 @@ pub(super) fn advance(
                     work.motion.next_dt = dt * piece;
                     piece = even_part(1.0 - to, piece);
                     spent_before = report.iterations;
+                }
+                if longest < 1.0 {
+                    piece = even_part(1.0 - to, longest.min(piece));
                 }
                 if let Some(watch) = watch.as_mut().filter(|_| to < 1.0) {
                     watch(&halfway(model, state, work, &report, t, dt * (to - done)));
@@ -539,6 +547,7 @@ fn step_piece(
         *factored = None;
         return Err(SolveError::Inverts.into());
     }
+    check_depth(model, &config.x).inspect_err(|_| *factored = None)?;
     if parts.inertia.as_ref().is_some_and(|i| i.accuracy.is_some()) {
         let error = formula.as_ref().map_or(0.0, |(_, formula)| motion.error(formula, dofs, before, config));
         if let Some(pace) = bound.filter(|pace| !pace.holds(error)) {

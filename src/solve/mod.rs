@@ -77,6 +77,19 @@ pub enum SolveError {
          choose a law that resists collapse (neo-hookean), or take it as it is with [solver] inversion = \"allow\""
     )]
     Inverts,
+    /// The tissue lies so deep in the shape of a contact that it may come out on the wrong side; a smaller step may not.
+    #[error(
+        "the tissue would lie {depth:.2e} m deep in the shape of contact `{contact}`, which can tell its sides to {most:.2e} m: \
+         move the shape from outside, or make the contact stiffer"
+    )]
+    TooDeep {
+        /// Name of the contact.
+        contact: String,
+        /// Depth of the deepest point, m.
+        depth: f64,
+        /// Most, m.
+        most: f64,
+    },
     /// The modes of vibration were not all found.
     #[error(
         "{found} of {wanted} modes of vibration were found among {size} directions: ask for other `modes` of [inertia], \
@@ -100,6 +113,7 @@ impl SolveError {
             SolveError::Singular { .. }
             | SolveError::NotFinite
             | SolveError::Inverts
+            | SolveError::TooDeep { .. }
             | SolveError::TooLarge { .. }
             | SolveError::Modes { .. } => 1,
         }

@@ -3,8 +3,8 @@
 //! Along a direction, since det F is linear in each single entry: entrywise differences would be exact and show no order.
 
 use cutis::effect::{
-    DeadLoad, Elements, Gravity, Inertia, LAWS, Measure, Muscle, Pressure, Springs, damping_memory, springs,
-    stiffness_damping,
+    Contact, DeadLoad, Elements, Gravity, Inertia, LAWS, Measure, Muscle, Pressure, Shape, Springs, damping_memory,
+    springs, stiffness_damping,
 };
 use cutis::energy::{
     Corotational, Energy, Fung, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, StableNeoHookean,
@@ -180,6 +180,35 @@ fn terms_have_the_derivatives_they_claim() {
     check_term(&OnElements(Springs(springs(1.0, &rest, &TETS))), &rest, SEED + 7);
     check_term(&DeadLoad { shares: vec![(1, 0.25), (4, 0.75)], input: 1 }, &rest, SEED + 3);
     check_term(&Pressure { triangles: vec![[0, 1, 2], [1, 4, 2]], input: 3 }, &rest, SEED + 4);
+}
+
+/// Shapes so large that all points stay inside, in the onset and beyond: elsewhere slopes are continuous and no more. Their
+/// frames are strained, which no bone does.
+#[test]
+fn contacts_have_the_derivatives_they_claim() {
+    let tube =
+        |points: &[[f64; 3]], radius| Shape::Tube { path: points.iter().map(|p| Vec3::from(*p)).collect(), radius };
+    let normal = Vec3::new(1.0, 2.0, -2.0) / 3.0;
+    for (k, shape) in [
+        tube(&[[0.4, 0.5, -3.0]], 8.0),
+        tube(&[[-9.0, 0.4, -3.0], [9.0, 2.5, -3.5]], 8.0),
+        tube(&[[20.0, 0.0, 9.0], [9.0, 2.5, -3.5], [-9.0, 0.4, -3.0]], 8.0),
+        Shape::HalfSpace { point: Vec3::new(2.0, 4.0, -4.0), normal },
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let middle = shape.middle();
+        let mut rest: Vec<Vec3> = REST.map(Vec3::from).to_vec();
+        rest.extend(Contact::corners(middle, 1.2));
+        for onset in [1e-3, 50.0] {
+            let triangles = vec![([0, 1, 2], 0.5), ([1, 4, 2], 0.7), ([0, 3, 1], 0.4)];
+            let shape = shape.clone();
+            let contact = Contact { shape, middle, frame: [5, 6, 7, 8], size: 1.2, triangles, stiffness: 3.0, onset };
+            assert!(contact.touch(&rest).expect("a contact").depth() > 0.5, "shape {k} touches nothing");
+            check_term(&contact, &rest, SEED + 20 + k as u64);
+        }
+    }
 }
 
 /// Stiffness damping with a past.

@@ -115,7 +115,7 @@ fn accepted(table: &str) -> BTreeSet<String> {
     let probe = match table {
         "" => "no_such_key = 1\n".to_owned(),
         _ if table.starts_with("tissue.") => format!("[[tissue]]\n[{table}]\nno_such_key = 1\n"),
-        "tissue" | "bone" | "muscle" | "load" | "pressure" | "marker" | "keyframe" => {
+        "tissue" | "bone" | "muscle" | "load" | "pressure" | "contact" | "marker" | "keyframe" => {
             format!("[[{table}]]\nno_such_key = 1\n")
         }
         _ => format!("[{table}]\nno_such_key = 1\n"),
