@@ -1,7 +1,9 @@
 //! Whether a DICOM file can hold what its elements claim. The parser makes room for a claim before it reads, so a file of
 //! a few hundred bytes could ask for gigabytes.
 //!
-//! Source: DICOM PS3.5 2024, 7.1 (data elements) and 7.5 (sequences, items, undefined lengths).
+//! Where files are not what the standard wants, it goes the parser's way: a value representation that is none is `UN`.
+//!
+//! Source: DICOM PS3.5 2024, 7.1 (data elements) and 7.5 (sequences, items, undefined lengths); PS3.10, 7.1 (file meta group).
 
 /// Preamble and mark before the first element.
 const START: usize = 132;
@@ -9,9 +11,11 @@ const START: usize = 132;
 const UNDEFINED: u32 = u32::MAX;
 /// Group of items and delimiters, and the first bytes of an item.
 const ITEMS: u16 = 0xFFFE;
-/// Value representations whose length takes four bytes behind two that are reserved.
-const LONG: [&[u8; 2]; 13] =
-    [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT", b"UV"];
+/// Value representations whose length takes two bytes; that of all others takes four, behind two that are reserved.
+const SHORT: [&[u8; 2]; 21] = [
+    b"AE", b"AS", b"AT", b"CS", b"DA", b"DS", b"DT", b"FL", b"FD", b"IS", b"LO", b"LT", b"PN", b"SH", b"SL", b"SS",
+    b"ST", b"TM", b"UI", b"UL", b"US",
+];
 
 /// An element that claims more than is left.
 #[derive(Debug, PartialEq, Eq)]
@@ -36,30 +40,26 @@ struct Syntax {
 pub(super) fn lengths_fit(file: &[u8]) -> Result<(), Claim> {
     const META: Syntax = Syntax { explicit: true, little: true };
     let after_meta = data_set(file);
-    let (mut at, mut in_meta) = (START, true);
+    let end_of_meta = meta(file).map_or(START, |length| START + 12 + length as usize);
+    let mut at = START;
     while let Some(head) = file.get(at..at + 8) {
-        in_meta &= head[..2] == [2, 0];
-        let syntax = if in_meta { META } else { after_meta };
+        let syntax = if at < end_of_meta { META } else { after_meta };
         let word = |k: usize| {
             let bytes = [head[k], head[k + 1]];
             if syntax.little { u16::from_le_bytes(bytes) } else { u16::from_be_bytes(bytes) }
         };
         let (group, element) = (word(0), word(2));
         let vr = &head[4..6];
-        let long = LONG.iter().any(|v| v[..] == *vr);
         let (header, bytes) = if group == ITEMS || !syntax.explicit {
             (8, length(file, at + 4, syntax.little))
-        } else if long || !vr.iter().all(u8::is_ascii_uppercase) {
-            (12, length(file, at + 8, syntax.little))
-        } else {
+        } else if SHORT.iter().any(|v| v[..] == *vr) {
             (8, Some(u32::from(word(6))))
+        } else {
+            (12, length(file, at + 8, syntax.little))
         };
         let Some(bytes) = bytes else { return Ok(()) };
         at += header;
         if bytes == UNDEFINED {
-            if vr == b"UN" && syntax.explicit {
-                return Ok(()); // what follows is written another way
-            }
             continue;
         }
         let left = file.len().saturating_sub(at);
@@ -75,6 +75,12 @@ pub(super) fn lengths_fit(file: &[u8]) -> Result<(), Claim> {
 fn length(file: &[u8], at: usize, little: bool) -> Option<u32> {
     let bytes = file.get(at..at + 4)?.try_into().ok()?;
     Some(if little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) })
+}
+
+/// Bytes of the meta group behind the element that tells them, which comes first.
+fn meta(file: &[u8]) -> Option<u32> {
+    const FIRST: &[u8] = b"\x02\x00\x00\x00UL\x04\x00";
+    if file.get(START..START + FIRST.len()) == Some(FIRST) { length(file, START + FIRST.len(), true) } else { None }
 }
 
 /// An implicit sequence shows only in what it holds.
@@ -104,7 +110,9 @@ mod tests {
     /// A file with this transfer syntax and these bytes as data set.
     fn file(uid: &[u8], data: &[u8]) -> Vec<u8> {
         let mut out = vec![0; 128];
-        out.extend(b"DICM\x02\x00\x10\x00UI");
+        out.extend(b"DICM\x02\x00\x00\x00UL\x04\x00");
+        out.extend((8 + uid.len() as u32).to_le_bytes());
+        out.extend(b"\x02\x00\x10\x00UI");
         out.extend((uid.len() as u16).to_le_bytes());
         out.extend(uid);
         out.extend(data);
@@ -119,6 +127,15 @@ mod tests {
         let huge = file(explicit, b"\x08\x00\x60\x00CS\x02\x00CT\xe0\x7f\x10\x00OW\x00\x00\x00\x00\x00\x7fabcd");
         let claim = Claim { group: 0x7fe0, element: 0x0010, bytes: 0x7f00_0000, left: 4 };
         assert_eq!(lengths_fit(&huge), Err(claim));
+    }
+
+    #[test]
+    fn what_is_no_representation_has_a_long_length() {
+        let huge = file(b"1.2.840.10008.1.2.1\0", b"\x28\x00\x00\x20TS\x00\x00\xdf\xff\xfc\xfeab");
+        assert_eq!(lengths_fit(&huge).unwrap_err().left, 2);
+        let within =
+            b"\x09\x00\x10\x00UN\0\0\xff\xff\xff\xff\xfe\xff\x00\xe0\xff\xff\xff\xff\x08\x00\x01\x00OB\0\0\0\0\0\x70";
+        assert_eq!(lengths_fit(&file(b"1.2.840.10008.1.2.1\0", within)).unwrap_err().bytes, 0x7000_0000);
     }
 
     #[test]
