@@ -7,7 +7,10 @@
 //!
 //! Source: Quilez, "3D signed distance functions", 2008 on, for the capsule; derivatives are elementary.
 
+use std::f64::consts::{PI, TAU};
+
 use crate::math::{Mat3, Vec3};
+use crate::mesh::FineSkin;
 
 /// A rigid shape in its rest position.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,6 +61,17 @@ impl Shape {
         }
     }
 
+    /// What it looks like, wound outward: balls about the points of its line and barrels between them; a half-space is not
+    /// drawn.
+    pub fn surface(&self) -> FineSkin {
+        let mut surface = FineSkin::default();
+        if let Shape::Tube { path, radius } = self {
+            path.iter().for_each(|p| add_round(&mut surface, [*p, *p], *radius));
+            path.windows(2).for_each(|ends| add_round(&mut surface, [ends[0], ends[1]], *radius));
+        }
+        surface
+    }
+
     /// A point in its middle, m.
     pub fn middle(&self) -> Vec3 {
         match self {
@@ -82,6 +96,35 @@ impl Shape {
         match self {
             Shape::HalfSpace { .. } => f64::INFINITY,
             Shape::Tube { radius, .. } => *radius,
+        }
+    }
+}
+
+/// Sides of a round surface, and rings from one end of a ball to the other.
+const SIDES: u32 = 24;
+const RINGS: u32 = 12;
+
+/// A ball where both ends are one point, else a barrel from one to the other.
+fn add_round(surface: &mut FineSkin, ends: [Vec3; 2], radius: f64) {
+    let first = surface.vertices.len() as u32;
+    let axis = (ends[1] - ends[0]).try_normalize(0.0).unwrap_or_else(Vec3::z);
+    let across = axis.cross(&Vec3::ith(axis.iamin(), 1.0)).normalize();
+    let rings = if ends[0] == ends[1] { RINGS } else { 1 };
+    for ring in 0..=rings {
+        let along = f64::from(ring) / f64::from(rings);
+        let (sin, cos) = if rings == 1 { (1.0, 0.0) } else { (PI * along).sin_cos() };
+        let middle = ends[0] + along * (ends[1] - ends[0]) - radius * cos * axis;
+        for side in 0..SIDES {
+            let (s, c) = (TAU * f64::from(side) / f64::from(SIDES)).sin_cos();
+            surface.vertices.push(middle + radius * sin * (c * across + s * axis.cross(&across)));
+        }
+    }
+    for ring in 0..rings {
+        for side in 0..SIDES {
+            let at = |ring: u32, side: u32| first + ring * SIDES + side % SIDES;
+            let [a, b] = [at(ring, side), at(ring, side + 1)];
+            let [c, d] = [at(ring + 1, side), at(ring + 1, side + 1)];
+            surface.triangles.extend([[a, b, d], [a, d, c]]);
         }
     }
 }

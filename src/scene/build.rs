@@ -119,7 +119,7 @@ impl Builder<'_> {
         let first_of_contacts = mesh.nodes.len() as u32;
         let mut contacts = Vec::new();
         for (name, contact) in self.contacts(file, &mut mesh, &mut bones, &mut warnings)? {
-            contacts.push(sim::Contact { name, frame: contact.frame });
+            contacts.push(sim::Contact { name, frame: contact.frame, surface: contact.shape.surface() });
             terms.push(Box::new(contact));
         }
         let counts: Vec<(Drive, usize)> = bones.iter().map(|b| (b.drive, b.nodes.len())).collect();

@@ -24,6 +24,9 @@ impl Builder<'_> {
                 format!("`modes` of [inertia] want a scene whose forces are linear in motions and inputs; {found}");
             Err(self.text.at(modes.span().start, message))
         };
+        if let Some(contact) = file.contact.first() {
+            return refused(format!("found contact `{}`, which pushes on one side only", contact.name.get_ref()));
+        }
         if let Some(term) = terms.iter().find(|t| !t.is_quadratic()) {
             return refused(format!(
                 "found `{}`: give the tissue energy = \"linear\", or leave `modes` out",

@@ -7,7 +7,7 @@ use super::scheme::Scheme;
 use super::skin::Skin;
 use crate::fem::{Assembly, Dofs, Elimination, Embedding, Term};
 use crate::math::{Mat3, Vec3, svd};
-use crate::mesh::TetMesh;
+use crate::mesh::{FineSkin, TetMesh};
 use crate::port::Port;
 use crate::solve::{Rung, Strategy, nested_dissection};
 
@@ -58,12 +58,27 @@ pub struct Marker {
 }
 
 /// A rigid shape that a bone carries and the tissue cannot enter.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
     /// Name, unique among the contacts.
     pub name: String,
     /// Nodes of the bone that move it.
     pub frame: [u32; 4],
+    /// What it looks like at rest; no triangles where it has no end.
+    pub surface: FineSkin,
+}
+
+impl Contact {
+    /// The vertices of its surface where the nodes, at `X` when at rest, have gone to `x`, m.
+    pub fn placed(&self, X: &[Vec3], x: &[Vec3]) -> Vec<Vec3> {
+        let edges = |x: &[Vec3]| {
+            let [a, b, c, d] = self.frame.map(|i| x[i as usize]);
+            (a, Mat3::from_columns(&[b - a, c - a, d - a]))
+        };
+        let ((A, D), (a, d)) = (edges(X), edges(x));
+        let F = d * D.try_inverse().unwrap_or_else(Mat3::zeros);
+        self.surface.vertices.iter().map(|p| a + F * (p - A)).collect()
+    }
 }
 
 /// Dynamics: nodal masses and how time starts.

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use super::ahead::Ahead;
-use super::approach::{check_depth, safe_part};
+use super::approach::{Approach, check_depth};
 use super::linear_map::LinearMap;
 use super::linearisation::{Linearisation, with_problem};
 use super::modal;
@@ -248,12 +248,14 @@ pub(super) fn advance(
     if pace.is_some() && state.motion.next_dt > 0.0 {
         piece = even_part(1.0, (state.motion.next_dt / dt).max(smallest));
     }
-    let longest = safe_part(model, &state.inputs, &work.pivots, &mut work.config, &mut work.u).max(smallest);
-    if longest < 1.0 {
-        piece = even_part(1.0, longest.min(piece));
-    }
     let mut spent_before = 0;
+    let mut surely = true;
     while done < 1.0 {
+        let Workspace { pivots, config, inputs, before, .. } = &mut *work;
+        let approach = Approach { model, from: &state.applied, to: &state.inputs, pivots, config, done, smallest };
+        let (part, is_sure) = approach.part(inputs, before);
+        surely &= is_sure;
+        piece = piece.min(part);
         let to: f64 = if done + piece >= 1.0 - ROUND_OFF { 1.0 } else { done + piece };
         for ((now, from), last) in work.inputs.iter_mut().zip(&state.applied).zip(&state.inputs) {
             *now = if to == 1.0 { *last } else { from + to * (last - from) };
@@ -275,9 +277,6 @@ pub(super) fn advance(
                     work.motion.next_dt = dt * piece;
                     piece = even_part(1.0 - to, piece);
                     spent_before = report.iterations;
-                }
-                if longest < 1.0 {
-                    piece = even_part(1.0 - to, longest.min(piece));
                 }
                 if let Some(watch) = watch.as_mut().filter(|_| to < 1.0) {
                     watch(&halfway(model, state, work, &report, t, dt * (to - done)));
@@ -308,6 +307,9 @@ pub(super) fn advance(
     let smallest = min_det_f(model, &work.config.x);
     if smallest <= 0.0 && min_det_f(model, &state.config.x) > 0.0 {
         report.warnings.push(format!("elements are turned inside out (smallest det F {smallest:.3})"));
+    }
+    if !surely {
+        report.warnings.push("a contact's shape goes so far in this step that it may have passed tissue".into());
     }
     if let Some(pace) = pace.filter(|pace| !pace.holds(report.time_error)) {
         report.warnings.push(pace.broken(report.time_error));

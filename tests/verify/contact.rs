@@ -156,6 +156,25 @@ fn a_shape_does_not_jump_through_tissue() {
     assert!(once[2] > 1e-3 && (once[2] / slowly[2] - 1.0).abs() < 1e-6, "{once:?}, in small steps {slowly:?}");
 }
 
+/// Far from the tissue a shape goes where it likes in one piece; on its way in it is slowed only where it touches.
+#[test]
+fn a_shape_in_the_air_costs_no_pieces() {
+    let mut sim = sim(&pad(SMALL, "E = 15e3\nnu = 0.4", "path = [[0.02, 0.02, 0.031]]\nradius = 0.01"));
+    let mut go = |way: [f64; 3]| {
+        set(&mut sim, "bone.translation", 3, &way);
+        sim.step(0.1).expect("a step")
+    };
+    let far = go([0.0, 0.0, 0.5]);
+    assert_eq!((far.substeps, far.warnings.len()), (1, 0), "away from it");
+    assert_eq!(go([0.4, 0.3, 0.5]).substeps, 1, "aside");
+    assert_eq!(go([0.0, 0.0, 0.02]).substeps, 1, "back above it");
+    let near = go([0.0, 0.0, -0.003]);
+    assert!((2..=6).contains(&near.substeps) && near.warnings.is_empty(), "{near:?}");
+    go([0.0, 0.0, 0.5]);
+    let fast = go([0.0, 0.0, -0.004]);
+    assert!(fast.warnings.iter().any(|w| w.contains("may have passed tissue")), "{fast:?}");
+}
+
 #[test]
 fn tissue_that_would_lie_too_deep_is_refused_and_the_state_stays() {
     let soft = "path = [[0.02, 0.02, 0.031]]\nradius = 0.01\nstiffness = 1e3";
