@@ -36,6 +36,11 @@ pub const CASES: &[Case] = &[
         "Pulls the jaw by 5 cm and turns it by 90 degrees in one step; ends where twenty small steps end.",
         jump,
     ),
+    case(
+        "ball",
+        "Drives a ball 15 mm into the block in one step; ends where twenty small steps end; drawn off in one, at rest.",
+        ball,
+    ),
     Case {
         may_refuse: FOLDING,
         ..case("force-1e4", "Pushes with 1e4 times the force, answered or refused, then lets go; ends at rest.", force)
@@ -111,6 +116,28 @@ fn jump(law: &str, tally: &mut Tally) -> Result<(), End> {
         slow.step(DT)?;
     }
     trial.near(slow.sim.positions(), SAME, "where small steps lead")
+}
+
+fn ball(law: &str, tally: &mut Tally) -> Result<(), End> {
+    // A bone that no tissue sticks to carries it, half a millimetre above the top.
+    let more = "[[bone]]\nname = \"hand\"\nnodes = \"none\"\n[[contact]]\nname = \"ball\"\nbone = \"hand\"\n\
+                path = [[0.03, 0.02, 0.0425]]\nradius = 0.012\n";
+    let scene = Block { more, ..Block::of(law) }.text();
+    let mut slow_tally = Tally::default();
+    let mut slow = Trial::new(&scene, &mut slow_tally)?;
+    let mut trial = Trial::new(&scene, tally)?;
+    let hand = |trial: &mut Trial, depth: f64| trial.set("bone.translation", 6, &[0.0, 0.0, -depth]);
+    hand(&mut trial, 0.015)?;
+    trial.step(DT)?;
+    for k in 1..=20 {
+        hand(&mut slow, 0.015 * f64::from(k) / 20.0)?;
+        slow.step(DT)?;
+    }
+    trial.near(slow.sim.positions(), SAME, "where small steps lead")?;
+    hand(&mut trial, -0.01)?;
+    trial.step(DT)?;
+    // The last four nodes are the ball's.
+    trial.near(&trial.rest()[..trial.rest().len() - 4], SAME, "rest")
 }
 
 fn force(law: &str, tally: &mut Tally) -> Result<(), End> {
