@@ -46,7 +46,8 @@ pub fn seeds() -> Vec<Vec<u8>> {
     let mut files: Vec<_> = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
     files.retain(|p| p.extension().is_some_and(|e| e == "toml"));
     files.sort();
-    let smaller = |text: String| text.replace("cells = [6, 4, 2]", "cells = [3, 2, 1]");
+    let smaller =
+        |text: String| text.replace("cells = [6, 4, 2]", "cells = [3, 2, 1]").replace("[12, 8, 4]", "[3, 2, 1]");
     let shipped = files.iter().filter_map(|p| std::fs::read_to_string(p).ok()).map(smaller);
     shipped.chain(scenes::texts()).map(String::into_bytes).collect()
 }

@@ -8,7 +8,7 @@ use cutis::sim::{Model, Sim};
 const BLOCK: &str = "name = \"small\"\n[mesh.block]\nsize = [0.03, 0.02, 0.01]\ncells = [3, 2, 1]\n";
 const BONES: &str = "[[bone]]\nname = \"skull\"\nnodes = \"x_min\"\n[[bone]]\nname = \"jaw\"\nnodes = \"x_max\"\n";
 
-/// Linear, soft and loaded, loose bone, dynamic, with memory, with a muscle, averaged pressure.
+/// Linear, soft and loaded, loose bone, dynamic, with memory, with a muscle, averaged pressure, touched by a finger, in modes.
 pub fn texts() -> Vec<String> {
     let soft = "[[tissue]]\nE = 15e3\nnu = 0.4\n";
     let load = "[[load]]\nname = \"push\"\nat = [0.015, 0.01, 0.01]\nradius = 0.008\n";
@@ -23,6 +23,14 @@ pub fn texts() -> Vec<String> {
              radius = 0.01\nstress = 30e3\n"
         ),
         format!("{BLOCK}[[tissue]]\nenergy = \"neo-hookean\"\nE = 15e3\nnu = 0.49\npressure = \"nodal\"\n{BONES}"),
+        format!(
+            "{BLOCK}{soft}{BONES}[[bone]]\nname = \"finger\"\nnodes = \"none\"\n[[contact]]\nname = \"tip\"\nbone = \"finger\"\n\
+             path = [[0.015, 0.01, 0.0195]]\nradius = 0.01\n[[contact]]\nname = \"plate\"\nbone = \"jaw\"\n\
+             point = [0.0, 0.0, 0.011]\nnormal = [0, 0, -1]\n"
+        ),
+        format!(
+            "{BLOCK}[[tissue]]\nenergy = \"linear\"\nE = 15e3\nnu = 0.4\n{BONES}[inertia]\nmodes = 6\nscheme = \"bdf2\"\n"
+        ),
     ]
 }
 
