@@ -98,14 +98,25 @@ impl Series {
     }
 }
 
-/// What a picture shows of a model at these positions: its mesh, a fine skin in place of the mesh's own.
+/// Name of the face sets that show shapes of contacts.
+const SHAPE: &str = "shape of a contact";
+
+/// What a picture shows of a model at these positions: its mesh, a fine skin in place of the mesh's own, shapes of contacts.
 pub fn shown<const N: usize>(model: &Model, x: [&[Vec3]; N]) -> (TetMesh, [Vec<Vec3>; N]) {
     let mut mesh = model.mesh().clone();
+    let (nodes, at) = (&model.mesh().nodes, x);
     let mut x = x.map(<[Vec3]>::to_vec);
+    for contact in &model.parts().contacts {
+        let first = mesh.nodes.len() as u32;
+        mesh.nodes.extend(contact.placed(nodes, nodes));
+        x.iter_mut().zip(at).for_each(|(x, at)| x.extend(contact.placed(nodes, at)));
+        let triangles = contact.surface.triangles.iter().map(|t| t.map(|a| first + a)).collect();
+        mesh.face_sets.push(FaceSet { name: SHAPE.into(), triangles });
+    }
     if let Some(fine) = mesh.fine_skin.take() {
         let first = mesh.nodes.len() as u32;
-        mesh.nodes.extend(model.skin().all(&model.mesh().nodes));
-        x.iter_mut().for_each(|x| x.extend(model.skin().all(x)));
+        mesh.nodes.extend(model.skin().all(nodes));
+        x.iter_mut().zip(at).for_each(|(x, at)| x.extend(model.skin().all(at)));
         let triangles = fine.triangles.iter().map(|t| t.map(|a| first + a)).collect();
         mesh.face_sets.retain(|set| set.name != SKIN);
         mesh.face_sets.push(FaceSet { name: SKIN.into(), triangles });
@@ -114,13 +125,19 @@ pub fn shown<const N: usize>(model: &Model, x: [&[Vec3]; N]) -> (TetMesh, [Vec<V
 }
 
 const PANEL: (usize, usize) = (430, 560);
+/// Shapes of contacts.
+const STEEL: Rgb = [0.62, 0.66, 0.70];
 const INK: Rgb = [0.15, 0.15, 0.18];
 
 /// Panels side by side, coloured by displacement on one scale, with captions and the scale.
 pub fn picture(mesh: &TetMesh, panels: &[(&str, &[Vec3])]) -> Image {
-    let all: Vec<Vec3> = panels.iter().flat_map(|(_, x)| x.iter().copied()).collect();
-    let largest =
-        panels.iter().flat_map(|(_, x)| x.iter().zip(&mesh.nodes).map(|(x, X)| (x - X).norm())).fold(1e-9, f64::max);
+    let corners = |tissue: bool| {
+        let sets = mesh.face_sets.iter().filter(move |set| !tissue || set.name != SHAPE);
+        sets.flat_map(|set| set.triangles.as_flattened()).map(|&a| a as usize)
+    };
+    let all: Vec<Vec3> = panels.iter().flat_map(|(_, x)| corners(false).map(|a| x[a])).collect();
+    let motion = |x: &[Vec3]| corners(true).map(|a| (x[a] - mesh.nodes[a]).norm()).fold(1e-9, f64::max);
+    let largest = panels.iter().map(|(_, x)| motion(x)).fold(0.0, f64::max);
     // LPS axes: the face looks to -y, its left is +x, up is +z; seen from the front, a little from its left.
     let aspect = PANEL.0 as f64 / PANEL.1 as f64;
     let camera = Camera::around(&all, Vec3::new(0.55, -1.0, 0.10), Vec3::z(), aspect);
@@ -133,7 +150,11 @@ pub fn picture(mesh: &TetMesh, panels: &[(&str, &[Vec3])]) -> Image {
             .iter()
             .map(|set| Surface {
                 triangles: &set.triangles,
-                colour: if set.name == cutis::mesh::SKIN { &moved } else { &inner },
+                colour: match set.name.as_str() {
+                    SKIN => &moved,
+                    SHAPE => &|_| STEEL,
+                    _ => &inner,
+                },
             })
             .collect();
         image.paste(&draw(x, &surfaces, &camera, PANEL.0, PANEL.1), k * PANEL.0, 0);

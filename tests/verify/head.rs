@@ -28,6 +28,28 @@ fn a_smile_lifts_and_widens_the_corners_of_the_mouth_alike() {
     assert!(largest([left.x + right.x, left.y - right.y, left.z - right.z]) < 1e-6, "both alike: {left} {right}");
 }
 
+#[test]
+fn a_finger_feels_the_cheek_that_it_presses() {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/finger.toml");
+    let loaded = cutis::load::from_file(&scene).expect("the example");
+    let mut sim = Sim::new(Arc::new(loaded.model)).expect("a simulation");
+    sim.initialise().expect("rest");
+    let mut before = 0.0;
+    for k in 1..=4 {
+        for s in loaded.programme.settings(k as f64 * loaded.programme.dt) {
+            sim.set_f64(s.port, s.offset, &s.values).expect("keyframes fit their ports");
+        }
+        sim.step(loaded.programme.dt).expect("a step");
+        let force = rows(&get(&sim, "contact.force"))[0];
+        // It comes from the left front, so it is pushed back there.
+        assert!(force.norm() > before && force.x > 0.0 && force.y < 0.0, "{force}");
+        let all: Vec3 = rows(&get(&sim, "bone.reactionForce")).iter().sum();
+        assert!(all.norm() < 1e-3 * force.norm(), "the bones hold what the finger pushes: {all} left");
+        before = force.norm();
+    }
+    assert!(get(&sim, "contact.depth")[0] < 3e-4);
+}
+
 /// How far the markers go (mm) when these muscles, both sides of them, are activated alone.
 fn expression(sim: &mut Sim, muscles: &[(&str, f64)]) -> impl Fn(&str) -> Vec3 + use<> {
     sim.reset();
