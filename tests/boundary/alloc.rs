@@ -38,7 +38,7 @@ fn allocations(body: impl FnOnce()) -> u64 {
 
 #[test]
 fn the_counter_counts() {
-    assert_eq!(allocations(|| drop(Box::new(7))), 1);
+    assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(7)))), 1);
 }
 
 #[test]
@@ -46,6 +46,7 @@ fn set_and_get_allocate_nothing() {
     let fine_skin = super::util::root().join("tests/scenes/skin.toml");
     copies_freely(cutis::load::embedded().unwrap().model);
     copies_freely(cutis::load::from_file(&fine_skin).unwrap().model);
+    copies_freely(cutis::load::from_file(&super::util::root().join("tests/scenes/contact.toml")).unwrap().model);
 }
 
 fn copies_freely(model: cutis::sim::Model) {
@@ -88,6 +89,23 @@ fn a_step_after_the_first_allocates_nothing() {
             "step {k}: {counted} allocations, {factorisations} factors"
         );
     }
+}
+
+#[test]
+fn a_step_that_touches_allocates_nothing_without_a_new_factor() {
+    let scene = super::util::root().join("tests/scenes/contact.toml");
+    let mut sim = Sim::new(Arc::new(cutis::load::from_file(&scene).unwrap().model)).unwrap();
+    let translation = sim.model().ports().iter().position(|p| p.name == "bone.translation").unwrap();
+    sim.initialise().unwrap();
+    let mut clean = 0;
+    for k in 1..=20 {
+        sim.set_f64(translation, 3, &[0.0, 0.0, -1e-4 * f64::from(k)]).unwrap();
+        let mut factorisations = 0;
+        let counted = allocations(|| factorisations = sim.step(0.1).unwrap().factorisations);
+        assert!(factorisations > 0 || counted == 0, "step {k}: {counted} allocations");
+        clean += u32::from(factorisations == 0);
+    }
+    assert!(clean >= 10, "{clean} steps of 20 without a factor");
 }
 
 #[test]
