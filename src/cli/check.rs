@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use cutis::load;
-use cutis::sim::{Model, Sim};
+use cutis::sim::{Contact, Model, Sim};
 
 #[derive(clap::Args)]
 pub struct Check {
@@ -30,7 +30,11 @@ impl Check {
             say!("  fine skin: {} vertices, at most {:.2e} m outside the mesh", skin.len(), skin.farthest);
         }
         for bone in &model.parts().bones {
-            say!("  bone {}: {} nodes, {}", bone.name, bone.nodes.len(), bone.drive);
+            let contacts: Vec<&Contact> =
+                model.parts().contacts.iter().filter(|c| bone.nodes.binary_search(&c.frame[0]).is_ok()).collect();
+            let nodes = bone.nodes.len() - contacts.iter().map(|c| c.frame.len()).sum::<usize>();
+            let carries: String = contacts.iter().map(|c| format!(", carries contact {}", c.name)).collect();
+            say!("  bone {}: {nodes} nodes, {}{carries}", bone.name, bone.drive);
         }
         say!("{:>6}  {:<28} {:<12} {:<6} direction", "ref", "variable", "shape", "unit");
         for p in model.ports() {

@@ -42,7 +42,7 @@ impl Demo {
         let skin = skin_mesh(&mut host)?;
         let mut series = Series::new(&self.out);
         let mut x = positions(&mut host)?;
-        series.add(0.0, &skin, &x)?;
+        series.add(0.0, &skin, &[], &x)?;
         let mut panels = vec![("REST", x.clone())];
         let (mut spent, mut reaction) = (Duration::ZERO, Vec::new());
         let mut slowest = Duration::ZERO;
@@ -69,7 +69,7 @@ impl Demo {
             spent += took;
             slowest = slowest.max(took);
             x = positions(&mut host)?;
-            series.add(t, &skin, &x)?;
+            series.add(t, &skin, &[], &x)?;
             match k {
                 8 => panels.push(("JAW OPEN 8 DEG", x.clone())),
                 13 => {

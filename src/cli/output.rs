@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use cutis::io::{Data, write_bytes, write_pvd, write_vtu};
+use cutis::io::{Data, write_bytes, write_pvd, write_vtp, write_vtu};
 use cutis::math::Vec3;
 use cutis::mesh::{FaceSet, SKIN, TetMesh};
 use cutis::port::{Causality, Port, Type};
-use cutis::sim::{Model, Sim};
+use cutis::sim::{Contact, Model, Sim};
 use cutis::view::{Camera, Image, Rgb, Surface, draw, heat};
 
 /// Columns of the table: time and every varying port but the skin's, elements counted from 1.
@@ -69,31 +69,38 @@ impl Table {
     }
 }
 
-/// A ParaView time series of the whole mesh.
+/// A ParaView time series of the whole mesh and of what touches it.
 pub struct Series {
     folder: PathBuf,
-    frames: Vec<(f64, String)>,
+    n_frames: usize,
+    files: Vec<(f64, usize, String)>,
 }
 
 impl Series {
     pub fn new(folder: &Path) -> Series {
-        Series { folder: folder.into(), frames: Vec::new() }
+        Series { folder: folder.into(), n_frames: 0, files: Vec::new() }
     }
 
-    /// Adds the mesh with its nodes at `x`.
-    pub fn add(&mut self, t: f64, mesh: &TetMesh, x: &[Vec3]) -> super::Done {
+    /// Adds the mesh with its nodes at `x`, and the shapes of contacts that move with these.
+    pub fn add(&mut self, t: f64, mesh: &TetMesh, contacts: &[Contact], x: &[Vec3]) -> super::Done {
         let u: Vec<f64> = x.iter().zip(&mesh.nodes).flat_map(|(x, X)| <[f64; 3]>::from(x - X)).collect();
-        let name = format!("step{:04}.vtu", self.frames.len());
+        let name = format!("step{:04}.vtu", self.n_frames);
         let data = [Data { name: "displacement", components: 3, values: &u }];
         write_vtu(&self.folder.join(&name), mesh, x, &data, &[])?;
-        self.frames.push((t, name));
+        self.files.push((t, 0, name));
+        for (part, contact) in (1..).zip(contacts.iter().filter(|c| !c.surface.triangles.is_empty())) {
+            let name = format!("{}{:04}.vtp", contact.name, self.n_frames);
+            write_vtp(&self.folder.join(&name), &contact.placed(&mesh.nodes, x), &contact.surface.triangles)?;
+            self.files.push((t, part, name));
+        }
+        self.n_frames += 1;
         Ok(())
     }
 
     /// Writes the index that ParaView opens.
     pub fn save(&self) -> Result<PathBuf, Box<dyn std::error::Error>> {
         let path = self.folder.join("series.pvd");
-        write_pvd(&path, &self.frames)?;
+        write_pvd(&path, &self.files)?;
         Ok(path)
     }
 }

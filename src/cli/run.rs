@@ -41,7 +41,7 @@ impl Run {
         let start = sim.positions().to_vec();
         table.row(&sim);
         if !self.table_only {
-            series.add(0.0, model.mesh(), sim.positions())?;
+            series.add(0.0, model.mesh(), &model.parts().contacts, sim.positions())?;
         }
         let bar = progress::bar(programme.steps(), "steps");
         let (mut iterations, mut spent, mut longest) = (0, Duration::ZERO, Duration::ZERO);
@@ -61,7 +61,7 @@ impl Run {
             }
             table.row(&sim);
             if !self.table_only {
-                series.add(t, model.mesh(), sim.positions())?;
+                series.add(t, model.mesh(), &model.parts().contacts, sim.positions())?;
             }
             bar.inc(1);
         }

@@ -19,4 +19,4 @@ pub use ct::{read_labels, read_volume};
 pub use error::IoError;
 pub use file::{create_folder, read_bytes, read_text, write_bytes};
 pub use mesh::{read_mesh, read_surface, write_mesh};
-pub use vtk::{Data, write_pvd, write_vtu};
+pub use vtk::{Data, write_pvd, write_vtp, write_vtu};

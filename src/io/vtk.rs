@@ -1,4 +1,4 @@
-//! VTK unstructured grids: `.vtu` with raw appended data, legacy `.vtk` in text, `.pvd` time series.
+//! VTK unstructured grids: `.vtu` with raw appended data, legacy `.vtk` in text, `.pvd` time series; surfaces as `.vtp`.
 //!
 //! Source: "VTK File Formats", Kitware, the XML and the legacy chapter. Regions are cell data `region` with their names
 //! in field data, node sets point data `set:<name>`, face sets field data `faces:<name>`.
@@ -6,6 +6,7 @@
 mod base64;
 mod grid;
 mod legacy;
+mod vtp_write;
 mod vtu_read;
 mod vtu_write;
 
@@ -60,17 +61,25 @@ pub fn write_vtu(
     std::fs::write(path, vtu_bytes(mesh, x, point_data, cell_data)).map_err(IoError::file(path))
 }
 
-/// Writes the `.pvd` index of a time series: time in s and file name (relative to the index) of each step.
+/// Writes a triangle surface as `.vtp`.
 ///
 /// # Errors
 /// [`IoError::File`] when the file cannot be written.
-pub fn write_pvd(path: &Path, steps: &[(f64, String)]) -> Result<(), IoError> {
+pub fn write_vtp(path: &Path, vertices: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), IoError> {
+    std::fs::write(path, vtp_write::vtp_text(vertices, triangles)).map_err(IoError::file(path))
+}
+
+/// Writes the `.pvd` index of a time series: time in s, part (from 0) and file name (relative to the index) of each file.
+///
+/// # Errors
+/// [`IoError::File`] when the file cannot be written.
+pub fn write_pvd(path: &Path, files: &[(f64, usize, String)]) -> Result<(), IoError> {
     let mut out = String::from(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>\n",
     );
-    for (t, file) in steps {
+    for (t, part, file) in files {
         let file = quick_xml::escape::escape(file.as_str());
-        out += &format!("<DataSet timestep=\"{t}\" group=\"\" part=\"0\" file=\"{file}\"/>\n");
+        out += &format!("<DataSet timestep=\"{t}\" group=\"\" part=\"{part}\" file=\"{file}\"/>\n");
     }
     out += "</Collection>\n</VTKFile>\n";
     std::fs::write(path, out).map_err(IoError::file(path))

@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 
 use cutis::geometry::{Block, Pattern, block};
-use cutis::io::{Data, IoError, decode, encode, read_mesh, read_surface, write_mesh, write_pvd, write_vtu};
+use cutis::io::{Data, IoError, decode, encode, read_mesh, read_surface, write_mesh, write_pvd, write_vtp, write_vtu};
 use cutis::math::Vec3;
 use cutis::mesh::{FaceSet, FineSkin, NodeSet, TetMesh};
 
@@ -202,8 +202,14 @@ fn results_carry_their_fields() {
     let path = scratch("result.vtu");
     write_vtu(&path, &mesh, &mesh.nodes, &[Data { name: "u", components: 3, values: &u }], &[]).unwrap();
     assert_eq!(read_mesh(&path).unwrap(), mesh);
-    write_pvd(&scratch("result.pvd"), &[(0.0, "result.vtu".into())]).unwrap();
-    assert!(std::fs::read_to_string(scratch("result.pvd")).unwrap().contains("timestep=\"0\""));
+    write_pvd(&scratch("result.pvd"), &[(0.0, 0, "result.vtu".into()), (0.0, 1, "tool.vtp".into())]).unwrap();
+    let index = std::fs::read_to_string(scratch("result.pvd")).unwrap();
+    assert!(index.contains("timestep=\"0\" group=\"\" part=\"1\" file=\"tool.vtp\""), "{index}");
+    write_vtp(&scratch("tool.vtp"), &mesh.nodes[..4], &[[0, 1, 2], [0, 2, 3]]).unwrap();
+    let tool = std::fs::read_to_string(scratch("tool.vtp")).unwrap();
+    let numbers: Vec<f64> = tool.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let points: Vec<f64> = mesh.nodes[..4].iter().flat_map(|x| [x.x, x.y, x.z]).collect();
+    assert_eq!(numbers, [&points[..], &[0.0, 1.0, 2.0, 0.0, 2.0, 3.0, 3.0, 6.0]].concat());
 }
 
 #[test]
