@@ -93,8 +93,16 @@ fn read_slice(path: &Path) -> Result<Slice, IoError> {
         IoError::format(path, "the DICOM data set", why, "a whole DICOM file: copy it again")
     };
     let bytes = std::fs::read(path).map_err(IoError::file(path))?;
-    lengths_fit(&bytes).map_err(|Claim { group, element, bytes, left }| {
-        IoError::truncated(path, format!("element ({group:04X},{element:04X})"), bytes.into(), left as u64)
+    lengths_fit(&bytes).map_err(|claim| match claim {
+        Claim::Beyond { tag, bytes, left } => {
+            IoError::truncated(path, format!("element {tag}"), bytes.into(), left as u64)
+        }
+        Claim::Ragged { tag, bytes, unit } => IoError::format(
+            path,
+            format!("the length of element {tag}"),
+            format!("{bytes} bytes"),
+            &format!("a multiple of {unit}: copy the file again"),
+        ),
     })?;
     let object = dicom_object::open_file(path).map_err(|e| broken(&e))?;
     let modality = text(&object, MODALITY).unwrap_or_else(|| "unknown".into());

@@ -5,6 +5,10 @@
 //!
 //! Source: DICOM PS3.5 2024, 7.1 (data elements) and 7.5 (sequences, items, undefined lengths); PS3.10, 7.1 (file meta group).
 
+use dicom_core::Tag;
+use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
+use dicom_object::StandardDataDictionary;
+
 /// Preamble and mark before the first element.
 const START: usize = 132;
 /// Length of a sequence or an item that ends with a delimiter.
@@ -17,13 +21,28 @@ const SHORT: [&[u8; 2]; 21] = [
     b"ST", b"TM", b"UI", b"UL", b"US",
 ];
 
-/// An element that claims more than is left.
+/// An element whose length cannot be.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Claim {
-    pub group: u16,
-    pub element: u16,
-    pub bytes: u32,
-    pub left: usize,
+pub(super) enum Claim {
+    /// It claims more than is left.
+    Beyond { tag: Tag, bytes: u32, left: usize },
+    /// It is no whole number of values: the parser would go on in the middle of one.
+    Ragged { tag: Tag, bytes: u32, unit: u32 },
+}
+
+/// Bytes of a value in this representation; 1 for text and for bytes.
+fn unit(vr: &[u8]) -> u32 {
+    match vr {
+        b"OW" | b"SS" | b"US" => 2,
+        b"AT" | b"FL" | b"OF" | b"OL" | b"SL" | b"UL" => 4,
+        b"FD" | b"OD" | b"OV" | b"SV" | b"UV" => 8,
+        _ => 1,
+    }
+}
+
+/// The representation that the dictionary gives an element.
+fn implied(tag: Tag) -> &'static str {
+    StandardDataDictionary.by_tag(tag).map_or("UN", |entry| entry.vr().relaxed().to_string())
 }
 
 /// How the data set behind the file meta group (which is always explicit and little-endian) is written.
@@ -63,8 +82,13 @@ pub(super) fn lengths_fit(file: &[u8]) -> Result<(), Claim> {
             continue;
         }
         let left = file.len().saturating_sub(at);
+        let tag = Tag(group, element);
         if bytes as usize > left {
-            return Err(Claim { group, element, bytes, left });
+            return Err(Claim::Beyond { tag, bytes, left });
+        }
+        let unit = if group == ITEMS { 1 } else { unit(if syntax.explicit { vr } else { implied(tag).as_bytes() }) };
+        if at > end_of_meta && !bytes.is_multiple_of(unit) {
+            return Err(Claim::Ragged { tag, bytes, unit });
         }
         let entered = group == ITEMS || vr == b"SQ" && syntax.explicit || !syntax.explicit && begins_item(&file[at..]);
         at += if entered { 0 } else { bytes as usize };
@@ -125,17 +149,30 @@ mod tests {
         let sound = file(explicit, b"\x08\x00\x60\x00CS\x02\x00CT\xe0\x7f\x10\x00OW\x00\x00\x04\x00\x00\x00abcd");
         assert_eq!(lengths_fit(&sound), Ok(()));
         let huge = file(explicit, b"\x08\x00\x60\x00CS\x02\x00CT\xe0\x7f\x10\x00OW\x00\x00\x00\x00\x00\x7fabcd");
-        let claim = Claim { group: 0x7fe0, element: 0x0010, bytes: 0x7f00_0000, left: 4 };
+        let claim = Claim::Beyond { tag: Tag(0x7fe0, 0x0010), bytes: 0x7f00_0000, left: 4 };
         assert_eq!(lengths_fit(&huge), Err(claim));
     }
 
     #[test]
     fn what_is_no_representation_has_a_long_length() {
         let huge = file(b"1.2.840.10008.1.2.1\0", b"\x28\x00\x00\x20TS\x00\x00\xdf\xff\xfc\xfeab");
-        assert_eq!(lengths_fit(&huge).unwrap_err().left, 2);
+        let claim = Claim::Beyond { tag: Tag(0x0028, 0x2000), bytes: 0xfefc_ffdf, left: 2 };
+        assert_eq!(lengths_fit(&huge), Err(claim));
         let within =
             b"\x09\x00\x10\x00UN\0\0\xff\xff\xff\xff\xfe\xff\x00\xe0\xff\xff\xff\xff\x08\x00\x01\x00OB\0\0\0\0\0\x70";
-        assert_eq!(lengths_fit(&file(b"1.2.840.10008.1.2.1\0", within)).unwrap_err().bytes, 0x7000_0000);
+        let claim = lengths_fit(&file(b"1.2.840.10008.1.2.1\0", within)).unwrap_err();
+        assert!(matches!(claim, Claim::Beyond { bytes: 0x7000_0000, .. }), "{claim:?}");
+    }
+
+    #[test]
+    fn values_are_whole() {
+        let explicit = file(b"1.2.840.10008.1.2.1\0", b"\x11\x00\x60\x00AT\x02\x00CT");
+        let claim = Claim::Ragged { tag: Tag(0x0011, 0x0060), bytes: 2, unit: 4 };
+        assert_eq!(lengths_fit(&explicit), Err(claim));
+        // Rows are US in the dictionary.
+        let implicit = file(b"1.2.840.10008.1.2\0", b"\x28\x00\x10\x00\x03\x00\x00\x00abc");
+        let claim = Claim::Ragged { tag: Tag(0x0028, 0x0010), bytes: 3, unit: 2 };
+        assert_eq!(lengths_fit(&implicit), Err(claim));
     }
 
     #[test]
