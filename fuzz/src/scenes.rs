@@ -25,7 +25,7 @@ pub fn texts() -> Vec<String> {
         format!("{BLOCK}[[tissue]]\nenergy = \"neo-hookean\"\nE = 15e3\nnu = 0.49\npressure = \"nodal\"\n{BONES}"),
         format!(
             "{BLOCK}{soft}{BONES}[[bone]]\nname = \"finger\"\nnodes = \"none\"\n[[contact]]\nname = \"tip\"\nbone = \"finger\"\n\
-             path = [[0.015, 0.01, 0.0195]]\nradius = 0.01\n[[contact]]\nname = \"plate\"\nbone = \"jaw\"\n\
+             path = [[0.015, 0.01, 0.0195]]\nradius = 0.01\nfriction = 0.5\n[[contact]]\nname = \"plate\"\nbone = \"jaw\"\n\
              point = [0.0, 0.0, 0.011]\nnormal = [0, 0, -1]\n"
         ),
         format!(

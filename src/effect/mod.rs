@@ -21,7 +21,7 @@ mod tissue;
 mod tuned;
 mod viscous;
 
-pub use contact::Contact;
+pub use contact::{Contact, Friction};
 pub use damage::{Damaged, Softening};
 pub use fibre::Fibre;
 pub use graded::Graded;

@@ -160,7 +160,7 @@ pub trait Term: Send + Sync {
     }
 
     /// How it touches at `x`, for terms that are contacts.
-    fn touch(&self, _x: &[Vec3]) -> Option<Touch> {
+    fn touch(&self, _at: &At, _x: &[Vec3]) -> Option<Touch> {
         None
     }
 

@@ -110,7 +110,8 @@ impl Builder<'_> {
             }
             None => None,
         };
-        let Tissue { mut terms, density, n_history, tunable } = self.tissue(file, &mesh, &midsides, &mut warnings)?;
+        let Tissue { mut terms, density, mut n_history, tunable } =
+            self.tissue(file, &mesh, &midsides, &mut warnings)?;
         let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
         let mut bones = self.bones(bone, &mesh, rings)?;
         if rings > 0 {
@@ -118,7 +119,7 @@ impl Builder<'_> {
         }
         let first_of_contacts = mesh.nodes.len() as u32;
         let mut contacts = Vec::new();
-        for (name, contact) in self.contacts(file, &mut mesh, &mut bones, &mut warnings)? {
+        for (name, contact) in self.contacts(file, &mut mesh, &mut bones, &mut n_history, &mut warnings)? {
             contacts.push(sim::Contact { name, frame: contact.frame, surface: contact.shape.surface() });
             terms.push(Box::new(contact));
         }

@@ -6,7 +6,7 @@ use super::build::Builder;
 use super::file::{BoneSpec, ContactSpec, SceneFile};
 use super::materials::small_strain;
 use super::place::area;
-use crate::effect::{Contact, Shape};
+use crate::effect::{Contact, Friction, Shape};
 use crate::math::Vec3;
 use crate::mesh::{SKIN, TetMesh};
 use crate::sim::{Bone, Drive};
@@ -27,12 +27,18 @@ impl Builder<'_> {
         file: &SceneFile,
         mesh: &mut TetMesh,
         bones: &mut [Bone],
+        n_history: &mut usize,
         warnings: &mut Vec<String>,
     ) -> Result<Vec<(String, Contact)>, SceneError> {
         let names = self.text.names("contact", file.contact.iter().map(|c| &c.name))?;
         let mut contacts = Vec::new();
         for (name, spec) in names.into_iter().zip(&file.contact) {
-            contacts.push((name, self.contact(spec, file, mesh, bones, warnings)?));
+            let mut contact = self.contact(spec, file, mesh, bones, warnings)?;
+            if let Some(mu) = self.text.number("contact", "friction", &spec.friction)?.filter(|mu| *mu > 0.0) {
+                contact.friction = Some(Friction { mu, first: *n_history });
+                *n_history += Contact::memory(contact.triangles.len());
+            }
+            contacts.push((name, contact));
         }
         let idle = |(spec, bone): &(&BoneSpec, &Bone)| bone.nodes.is_empty() && wants_no_nodes(spec);
         if let Some((spec, _)) = file.bone.iter().zip(&*bones).find(idle) {
@@ -101,7 +107,7 @@ impl Builder<'_> {
         let frame = [0, 1, 2, 3].map(|i| first + i);
         mesh.nodes.extend(Contact::corners(middle, size));
         carrier.nodes.extend(frame);
-        Ok(Contact { shape, middle, frame, size, triangles, stiffness, onset: ONSET * edge })
+        Ok(Contact { shape, middle, frame, size, triangles, stiffness, onset: ONSET * edge, friction: None })
     }
 
     fn shape(&self, spec: &ContactSpec) -> Result<Shape, SceneError> {

@@ -278,6 +278,7 @@ pub struct ContactSpec {
     pub normal: Option<Triple>,
     pub faces: Option<Spanned<String>>,
     pub stiffness: Option<Spanned<f64>>,
+    pub friction: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Clone, Deserialize)]

@@ -208,6 +208,7 @@ pub const KEYS: &[Key] = &[
     key("contact", "normal", "[float; 3]", "", Any, "none", "Direction out of the half-space; of any length."),
     key("contact", "faces", "string", "", Any, "\"skin\"", "Face set that is held off."),
     key("contact", "stiffness", "float", "Pa/m", Positive, "20 E / edge", "Pressure for each metre that the surface goes in, which it does by pressure over this; `E` of the stiffest tissue, `edge` the mean one of the faces. More is harder to solve."),
+    key("contact", "friction", "float", "", NonNegative, "0", "Largest traction along the shape in units of the pressure (Coulomb). A point sticks from the step after the one in which it touches."),
     key("marker", "name", "string", "", Any, "required", "Name: the row of `marker.position`."),
     key("marker", "at", "[float; 3]", "m", Any, "required", "Place; the marker is the nearest point of the skin."),
     key("gravity", "acceleration", "[float; 3]", "m/s2", Any, "[0, 0, -9.80665]", "Start value of `gravity`."),

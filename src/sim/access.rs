@@ -1,7 +1,7 @@
 //! What a host sets and gets. Both are copies: nothing is solved, nothing is allocated.
 
 use super::{Model, Sim, SimError, State};
-use crate::fem::{Strain, Touch};
+use crate::fem::{At, Strain, Touch};
 use crate::math::{Vec3, log_rotation};
 use crate::port::{Port, Slot, Type};
 
@@ -189,8 +189,9 @@ impl View<'_> {
 
     /// How contact `k` touches.
     fn touch(&self, k: usize) -> Touch {
+        let at = At { history: &self.state.history, ..At::NOWHERE };
         let x = &self.state.config.x;
-        let mut touches = self.model.parts().terms.iter().filter_map(|term| term.touch(x));
+        let mut touches = self.model.parts().terms.iter().filter_map(|term| term.touch(&at, x));
         touches.nth(k).unwrap_or(Touch::NONE)
     }
 

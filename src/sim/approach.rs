@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 use super::model::Model;
 use super::pace::even_part;
 use super::step::{place_bones, target};
-use crate::fem::{Configuration, Role, Touch};
+use crate::fem::{At, Configuration, Role, Touch};
 use crate::math::Vec3;
 use crate::solve::SolveError;
 
@@ -119,5 +119,5 @@ pub(super) fn check_depth(model: &Model, x: &[Vec3]) -> Result<(), SolveError> {
 
 fn each<'a>(model: &'a Model, x: &'a [Vec3]) -> impl Iterator<Item = (usize, Touch)> + 'a {
     let terms = if model.parts().contacts.is_empty() { &[][..] } else { &model.parts().terms };
-    terms.iter().filter_map(|term| term.touch(x)).enumerate()
+    terms.iter().filter_map(|term| term.touch(&At::NOWHERE, x)).enumerate()
 }

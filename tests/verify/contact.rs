@@ -188,6 +188,57 @@ fn tissue_that_would_lie_too_deep_is_refused_and_the_state_stays() {
     assert_eq!(sim.save(), before);
 }
 
+/// A plate that is pressed on and dragged along: it sticks, then slides under mu times the force, and sticks on its way back.
+#[test]
+fn a_plate_drags_what_it_presses_on_by_coulombs_law() {
+    let scene = pad(SMALL, SOFT, &format!("{PLATE}\nfriction = 0.4"));
+    let mut sim = sim(&scene.replace("method = \"newton\"\ntolerance = 1e-11", "tolerance = 1e-9"));
+    let mut go = |x: f64, z: f64| {
+        press(&mut sim, [x, 0.0, z]);
+        let force = get(&sim, "contact.force");
+        (-force[0], force[2])
+    };
+    go(0.0, -1e-3);
+    let (along, _) = go(0.0, -2e-3);
+    assert!(along.abs() < 1e-6, "nothing drags yet: {along}");
+    let (first, _) = go(1e-4, -2e-3);
+    let (twice, normal) = go(2e-4, -2e-3);
+    assert!((twice / first - 2.0).abs() < 0.02 && twice < 0.4 * normal, "it sticks: {first}, {twice} of {normal}");
+    let (back, _) = go(0.0, -2e-3);
+    assert!(back.abs() < 0.02 * first, "and is let go without a loss: {back}");
+    for k in 1..=6 {
+        go(2e-3 * f64::from(k), -2e-3);
+    }
+    let (slides, normal) = go(14e-3, -2e-3);
+    assert!((slides / (0.4 * normal) - 1.0).abs() < 1e-6, "it slides: {slides} of {normal}");
+    let (turned, normal) = go(13.9e-3, -2e-3);
+    assert!(turned < 0.99 * 0.4 * normal, "on its way back it sticks: {turned} of {normal}");
+    let felt = get(&sim, "bone.reactionForce");
+    let all = Vec3::new(felt[0] + felt[3], felt[1] + felt[4], felt[2] + felt[5]);
+    assert!(all.norm() < 1e-5, "the base holds what is dragged: {all}");
+}
+
+#[test]
+fn a_restored_stroke_goes_on_bit_for_bit() {
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes/contact_friction.toml");
+    let stroke = |sim: &mut Sim, k: u32| {
+        set(sim, "bone.translation", 3, &[0.0, 0.002 * f64::from(k), -0.003]);
+        sim.step(0.25).expect("a step");
+    };
+    let model = std::sync::Arc::new(cutis::load::from_file(&scene).expect("a scene").model);
+    let mut sim = Sim::new(model.clone()).expect("a simulation");
+    (0..3).for_each(|k| stroke(&mut sim, k));
+    let bytes = sim.save().to_bytes(&model);
+    let mut other = Sim::new(model.clone()).expect("a simulation");
+    other.restore(&cutis::sim::State::from_bytes(&bytes, &model).expect("its own state")).expect("its own state");
+    assert_eq!(get(&other, "contact.force"), get(&sim, "contact.force"));
+    for k in 3..6 {
+        stroke(&mut sim, k);
+        stroke(&mut other, k);
+        assert_eq!(sim.positions(), other.positions());
+    }
+}
+
 /// A loose pad falls onto a table, and comes to lie on it with its weight.
 #[test]
 fn a_pad_that_falls_on_a_table_rests_on_it_with_its_weight() {
@@ -226,43 +277,61 @@ fn a_tooth_on_a_jaw_that_forces_drive_feels_the_rest_of_them() {
     assert!(left(&torque, [1e-4, -4e-4, 2e-4]) < 1e-9, "{torque:?}");
 }
 
+/// Both with friction that holds and with friction that slides.
+#[test]
+fn derivatives_know_of_friction() {
+    for (mu, way) in [(5.0, 2e-4), (0.2, 6e-3)] {
+        let contact = format!("path = [[0.0, 0.01, 0.034], [0.02, 0.022, 0.029]]\nradius = 0.01\nfriction = {mu:?}");
+        let scene = pad(SMALL, "E = 15e3\nnu = 0.4", &contact);
+        let mut sim = sim(&scene.replace("tolerance = 1e-11", "tolerance = 1e-12\nmax_iterations = 2000"));
+        press(&mut sim, [0.0, 0.0, -0.002]);
+        press(&mut sim, [0.0, 0.5 * way, -0.002]);
+        compare(&mut sim, [0.0, way, -0.002], 1e-3);
+    }
+}
+
 /// `<w, J v>` from one side and `<J' w, v>` from the other, and both from differences of whole steps.
 #[test]
 fn derivatives_know_of_contacts() {
     let contact = "path = [[0.0, 0.01, 0.034], [0.02, 0.022, 0.029]]\nradius = 0.01";
     let mut sim = sim(&pad(SMALL, "E = 15e3\nnu = 0.4", contact));
-    press(&mut sim, [0.0003, 0.0, -0.002]);
+    compare(&mut sim, [0.0003, 0.0, -0.002], 1e-4);
+}
+
+/// Takes the probe to `to` in one step, and compares derivatives there.
+fn compare(sim: &mut Sim, to: [f64; 3], slack: f64) {
     let before = sim.save();
+    press(sim, to);
     let (input, outputs) =
-        (port(&sim, "bone.translation"), ["skin.position", "bone.reactionForce", "bone.reactionTorque"]);
-    let unknowns = outputs.map(|name| port(&sim, name));
+        (port(sim, "bone.translation"), ["skin.position", "bone.reactionForce", "bone.reactionTorque"]);
+    let unknowns = outputs.map(|name| port(sim, name));
     let seed = [0.0, 0.0, 0.0, 0.3, -0.2, 1.0];
     let n: usize = unknowns.iter().map(|&u| sim.model().ports()[u].len()).sum();
     let mut forward = vec![0.0; n];
     sim.directional_derivative(&[input], &seed, &unknowns, &mut forward).expect("a derivative");
-    let start = get(&sim, "bone.translation");
-    let h = 1e-7;
-    let mut side = |h: f64| {
-        sim.restore(&before).expect("its own state");
-        let moved: Vec<f64> = start.iter().zip(seed).map(|(v, s)| v + h * s).collect();
-        set(&mut sim, "bone.translation", 0, &moved);
-        sim.step(0.1).expect("nearby");
-        outputs.iter().flat_map(|name| get(&sim, name)).collect::<Vec<f64>>()
-    };
-    let (plus, minus) = (side(h), side(-h));
     let skin = n - 12;
-    for (part, name) in [(0..skin, "skin"), (skin..n - 6, "force"), (n - 6..n, "torque")] {
-        let scale = largest(forward[part.clone()].iter().copied());
-        let error = largest(part.map(|i| (plus[i] - minus[i]) / (2.0 * h) - forward[i]));
-        assert!(error < 1e-4 * scale, "{name}: off by {error:.1e} of {scale:.1e}");
-    }
-    sim.restore(&before).expect("its own state");
     let w: Vec<f64> = (0..n).map(|i| if i < skin { (i as f64).sin() } else { 1e-3 * (i as f64).cos() }).collect();
     let mut back = vec![0.0; 6];
     sim.adjoint_derivative(&unknowns, &w, &[input], &mut back).expect("an adjoint");
     let (one, other): (f64, f64) =
         (w.iter().zip(&forward).map(|(w, j)| w * j).sum(), back.iter().zip(seed).map(|(b, s)| b * s).sum());
-    assert!((one - other).abs() < 1e-7 * one.abs(), "{one} forward, {other} back");
+    let size: f64 = w.iter().zip(&forward).map(|(w, j)| (w * j).abs()).sum();
+    assert!((one - other).abs() < 1e-6 * size, "{one} forward, {other} back, of {size}");
+    let start = get(sim, "bone.translation");
+    let h = 1e-7;
+    let mut side = |h: f64| {
+        sim.restore(&before).expect("its own state");
+        let moved: Vec<f64> = start.iter().zip(seed).map(|(v, s)| v + h * s).collect();
+        set(sim, "bone.translation", 0, &moved);
+        sim.step(0.1).expect("nearby");
+        outputs.iter().flat_map(|name| get(sim, name)).collect::<Vec<f64>>()
+    };
+    let (plus, minus) = (side(h), side(-h));
+    for (part, name) in [(0..skin, "skin"), (skin..n - 6, "force"), (n - 6..n, "torque")] {
+        let scale = largest(forward[part.clone()].iter().copied());
+        let error = largest(part.map(|i| (plus[i] - minus[i]) / (2.0 * h) - forward[i]));
+        assert!(error < slack * scale, "{name}: off by {error:.1e} of {scale:.1e}");
+    }
 }
 
 #[test]

@@ -3,8 +3,8 @@
 //! Along a direction, since det F is linear in each single entry: entrywise differences would be exact and show no order.
 
 use cutis::effect::{
-    Contact, DeadLoad, Elements, Gravity, Inertia, LAWS, Measure, Muscle, Pressure, Shape, Springs, damping_memory,
-    springs, stiffness_damping,
+    Contact, DeadLoad, Elements, Friction, Gravity, Inertia, LAWS, Measure, Muscle, Pressure, Shape, Springs,
+    damping_memory, springs, stiffness_damping,
 };
 use cutis::energy::{
     Corotational, Energy, Fung, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, StableNeoHookean,
@@ -201,12 +201,18 @@ fn contacts_have_the_derivatives_they_claim() {
         let middle = shape.middle();
         let mut rest: Vec<Vec3> = REST.map(Vec3::from).to_vec();
         rest.extend(Contact::corners(middle, 1.2));
-        for onset in [1e-3, 50.0] {
+        // Without friction; held by it; sliding under it.
+        for (onset, mu) in [(1e-3, 0.0), (50.0, 0.0), (1e-3, 40.0), (1e-3, 1e-3)] {
             let triangles = vec![([0, 1, 2], 0.5), ([1, 4, 2], 0.7), ([0, 3, 1], 0.4)];
             let shape = shape.clone();
-            let contact = Contact { shape, middle, frame: [5, 6, 7, 8], size: 1.2, triangles, stiffness: 3.0, onset };
-            assert!(contact.touch(&rest).expect("a contact").depth() > 0.5, "shape {k} touches nothing");
-            check_term(&contact, &rest, SEED + 20 + k as u64);
+            let friction = (mu > 0.0).then_some(Friction { mu, first: 2 });
+            let mut random = Random(SEED + 30);
+            let mut history: Vec<f64> = (0..2 + Contact::memory(3)).map(|_| random.number()).collect();
+            history.iter_mut().skip(5).step_by(4).for_each(|touched| *touched = 1.0);
+            let contact =
+                Contact { shape, middle, frame: [5, 6, 7, 8], size: 1.2, triangles, stiffness: 3.0, onset, friction };
+            assert!(contact.touch(&At::NOWHERE, &rest).expect("a contact").depth() > 0.5, "shape {k} touches nothing");
+            check_term_at(&contact, &rest, SEED + 20 + k as u64, &history);
         }
     }
 }
