@@ -6,10 +6,9 @@
 //! ```
 //!
 //! The integral is over the surface at rest, at three points of each triangle: vertices alone would let a shape slip between
-//! them. The shape moves with four nodes y_i that its bone
-//! carries like any other of its nodes: they give the place of a point x of the surface in the shape's rest position, and
-//! take the force on it by their barycentric weights there, so that the bone feels force and torque exactly. Pressure and
-//! its slope are continuous; how deep it goes is of the order p/k.
+//! them. The shape moves with four nodes y_i that its bone carries like any other of its nodes: they give the place of a point
+//! x of the surface in the shape's rest position, and take the force on it by their barycentric weights there, so that the
+//! bone feels force and torque exactly. Pressure and its slope are continuous; how deep it goes is of the order p/k.
 //!
 //! With G the stiffness by x, f = dW/dx, w_i the weights of X and p_i = F^-T c_i, the blocks are
 //!
@@ -29,9 +28,8 @@
 //!
 //! Friction has no energy, so p and n are taken at the last iterate; at the solution they are exact.
 //!
-//! Source: Wriggers, "Computational Contact Mechanics", 2nd ed., 2006, sections 5.4 for the penalty and 5.2.3 for
-//! friction; points inside
-//! facets after Fischer & Wriggers, Comput. Mech. 36, 2005; the four nodes are ours.
+//! Source: Wriggers, "Computational Contact Mechanics", 2nd ed., 2006, for the penalty and for Coulomb's law with an elastic
+//! part; points inside facets after Fischer & Wriggers, Comput. Mech. 36, 2005; the four nodes are ours.
 
 use super::shape::{Distance, Shape};
 use crate::fem::{At, Curvature, HessianSink, Term, Touch};

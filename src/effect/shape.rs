@@ -4,8 +4,6 @@
 //! d(X) = |X - nearest point of the path| - r        a ball (one point), a capsule (two), a bent tube (more)
 //! d(X) = (X - P) . n                                a half-space
 //! ```
-//!
-//! Source: Quilez, "3D signed distance functions", 2008 on, for the capsule; derivatives are elementary.
 
 use std::f64::consts::{PI, TAU};
 

@@ -51,7 +51,7 @@ fn a_plate_on_a_pad_of_cork_meets_its_closed_form() {
 
 /// Force of a ball pressed into a layer that is bonded to its base, linear and small.
 ///
-/// Source: Dimitriadis et al., Biophys. J. 82, 2002, equation 13.
+/// Source: Dimitriadis et al., Biophys. J. 82, 2002.
 fn bonded_layer(E: f64, nu: f64, R: f64, h: f64, depth: f64) -> f64 {
     let alpha = -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1.0 - nu);
     let beta = (0.6387 - 1.0277 * nu + 1.5164 * nu * nu) / (1.0 - nu);
