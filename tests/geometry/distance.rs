@@ -1,8 +1,8 @@
 //! Sampled distances agree with exact ones.
 use cutis::geometry::{Distance, Field, Isosurface, Nearest, Volume, marching_cubes};
-use cutis::math::Vec3;
+use cutis::math::{Random, Vec3};
 
-use super::marching_cubes::{Random, grid};
+use super::marching_cubes::grid;
 
 fn ball() -> Volume {
     let mut g = grid([40, 40, 20], 1e-3);
@@ -24,7 +24,7 @@ fn distance_to_a_ball_is_a_distance() {
     let mut random = Random(3);
     let (mut near, mut far) = (0.0f64, 0.0f64);
     for _ in 0..20_000 {
-        let p = Vec3::from_fn(|_, _| 0.001 + 0.037 * random.next());
+        let p = Vec3::from_fn(|_, _| 0.001 + 0.037 * random.number());
         let exact = (p - Vec3::repeat(0.0195)).norm() - 0.012;
         let error = (field.at(&p) - exact).abs();
         if exact.abs() < 1.5e-3 {
@@ -45,7 +45,7 @@ fn nearest_agrees_with_brute_force() {
     let bins = Nearest::new(&surface, 2e-3);
     let mut random = Random(5);
     for _ in 0..200 {
-        let p = Vec3::from_fn(|_, _| -0.01 + 0.06 * random.next());
+        let p = Vec3::from_fn(|_, _| -0.01 + 0.06 * random.number());
         let each = (0..surface.triangles.len())
             .map(|t| (cutis::geometry::nearest_on_triangle(&p, surface.corners(t)) - p).norm());
         let brute = each.fold(f64::INFINITY, f64::min);

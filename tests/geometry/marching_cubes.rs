@@ -1,22 +1,9 @@
 //! Isosurfaces are closed manifolds, whatever the values, and converge at second order.
 use cutis::geometry::{Grid, marching_cubes};
-use cutis::math::{Mat3, Vec3};
+use cutis::math::{Mat3, Random, Vec3};
 
 pub fn grid(dims: [usize; 3], h: f64) -> Grid {
     Grid { dims, spacing: Vec3::repeat(h), origin: Vec3::zeros(), direction: Mat3::identity() }
-}
-
-/// A small generator of reproducible numbers in [0, 1) (SplitMix64, G. Steele et al., 2014).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
 }
 
 #[test]
@@ -30,7 +17,7 @@ fn ten_thousand_random_volumes_are_closed_manifolds() {
         for k in 1..n - 1 {
             for j in 1..n - 1 {
                 for i in 1..n - 1 {
-                    let v = 2.0 * random.next() - 1.0;
+                    let v = 2.0 * random.number() - 1.0;
                     // Every third volume has few distinct values, zeros and ties among them.
                     values[g.index([i, j, k])] = if coarse { (v * 2.0).round() as f32 } else { v as f32 };
                 }

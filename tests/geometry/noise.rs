@@ -2,9 +2,10 @@
 use cutis::geometry::{
     Cuboid, Distance, Isosurface, MeshReport, MeshingError, Side, Uniform, Volume, Wall, tetrahedralise,
 };
+use cutis::math::Random;
 use cutis::mesh::TetMesh;
 
-use super::marching_cubes::{Random, grid};
+use super::marching_cubes::grid;
 
 #[test]
 fn random_volumes_are_sound() {
@@ -12,7 +13,7 @@ fn random_volumes_are_sound() {
     let mut made = 0;
     for trial in 0..60 {
         let g = grid([14; 3], 1e-3);
-        let mut samples: Vec<f32> = (0..g.len()).map(|_| (2.0 * random.next() - 0.9) as f32).collect();
+        let mut samples: Vec<f32> = (0..g.len()).map(|_| (2.0 * random.number() - 0.9) as f32).collect();
         // Some volumes are smoothed once, some twice, some not at all.
         for _ in 0..trial % 3 {
             let old = samples.clone();

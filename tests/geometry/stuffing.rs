@@ -66,9 +66,9 @@ fn shell_between_balls() {
 
 #[test]
 fn random_balls_stay_in_bounds() {
-    let mut random = super::marching_cubes::Random(11);
+    let mut random = cutis::math::Random(11);
     for trial in 0..30 {
-        let mut ball = |r: f64| Ball { centre: Vec3::from_fn(|_, _| 0.02 * random.next() - 0.01), radius: r };
+        let mut ball = |r: f64| Ball { centre: Vec3::from_fn(|_, _| 0.02 * random.number() - 0.01), radius: r };
         let (a, b, c) = (ball(0.03), ball(0.012), ball(0.01));
         let walls = [
             Wall { name: "skin", field: &a, side: Side::Inside },

@@ -3,20 +3,19 @@
 use std::sync::Arc;
 
 use cutis::effect::Law;
-use cutis::math::{Mat3, Vec3};
+use cutis::math::{self, Mat3, Vec3};
 use cutis::sim::Sim;
 
-/// A small reproducible generator (SplitMix64; Steele, Lea & Flood, OOPSLA 2014).
+/// The crate's reproducible generator about zero.
 pub struct Random(pub u64);
 
 impl Random {
     /// Uniform in [-1, 1).
     pub fn number(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        let mut random = math::Random(self.0);
+        let number = 2.0 * random.number() - 1.0;
+        self.0 = random.0;
+        number
     }
     pub fn vector(&mut self) -> Vec3 {
         Vec3::new(self.number(), self.number(), self.number())
