@@ -112,21 +112,21 @@ const SHAPE: &str = "shape of a contact";
 pub fn shown<const N: usize>(model: &Model, x: [&[Vec3]; N]) -> (TetMesh, [Vec<Vec3>; N]) {
     let mut mesh = model.mesh().clone();
     let (nodes, at) = (&model.mesh().nodes, x);
+    let fine = mesh.fine_skin.take();
     let mut x = x.map(<[Vec3]>::to_vec);
+    let mut add = |name: &str, triangles: &[[u32; 3]], placed: &dyn Fn(&[Vec3]) -> Vec<Vec3>| {
+        let first = mesh.nodes.len() as u32;
+        mesh.nodes.extend(placed(nodes));
+        x.iter_mut().zip(at).for_each(|(x, at)| x.extend(placed(at)));
+        mesh.face_sets.retain(|set| set.name != SKIN || name != SKIN);
+        let triangles = triangles.iter().map(|t| t.map(|a| first + a)).collect();
+        mesh.face_sets.push(FaceSet { name: name.into(), triangles });
+    };
     for contact in &model.parts().contacts {
-        let first = mesh.nodes.len() as u32;
-        mesh.nodes.extend(contact.placed(nodes, nodes));
-        x.iter_mut().zip(at).for_each(|(x, at)| x.extend(contact.placed(nodes, at)));
-        let triangles = contact.surface.triangles.iter().map(|t| t.map(|a| first + a)).collect();
-        mesh.face_sets.push(FaceSet { name: SHAPE.into(), triangles });
+        add(SHAPE, &contact.surface.triangles, &|x| contact.placed(nodes, x));
     }
-    if let Some(fine) = mesh.fine_skin.take() {
-        let first = mesh.nodes.len() as u32;
-        mesh.nodes.extend(model.skin().all(nodes));
-        x.iter_mut().zip(at).for_each(|(x, at)| x.extend(model.skin().all(at)));
-        let triangles = fine.triangles.iter().map(|t| t.map(|a| first + a)).collect();
-        mesh.face_sets.retain(|set| set.name != SKIN);
-        mesh.face_sets.push(FaceSet { name: SKIN.into(), triangles });
+    if let Some(fine) = fine {
+        add(SKIN, &fine.triangles, &|x| model.skin().all(x));
     }
     (mesh, x)
 }
