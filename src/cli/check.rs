@@ -29,9 +29,8 @@ impl Check {
         if let Some(skin) = model.skin().embedding() {
             say!("  fine skin: {} vertices, at most {:.2e} m outside the mesh", skin.len(), skin.farthest);
         }
-        for bone in &model.parts().bones {
-            let contacts: Vec<&Contact> =
-                model.parts().contacts.iter().filter(|c| bone.nodes.binary_search(&c.frame[0]).is_ok()).collect();
+        for (b, bone) in model.parts().bones.iter().enumerate() {
+            let contacts: Vec<&Contact> = model.parts().contacts.iter().filter(|c| c.bone == b).collect();
             let nodes = bone.nodes.len() - contacts.iter().map(|c| c.frame.len()).sum::<usize>();
             let carries: String = contacts.iter().map(|c| format!(", carries contact {}", c.name)).collect();
             say!("  bone {}: {nodes} nodes, {}{carries}", bone.name, bone.drive);

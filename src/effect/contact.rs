@@ -76,8 +76,9 @@ const REMEMBERED: usize = 4;
 /// Change of a place in differences of tractions, in sizes of the frame.
 const CHANGE: f64 = 1e-6;
 
-/// Where the frame has taken the shape.
-struct Placed {
+/// Nodes, and where their frame has taken the shape.
+struct Placed<'a> {
+    x: &'a [Vec3],
     middle: Vec3,
     F_inverse: Mat3,
 }
@@ -128,10 +129,10 @@ impl Contact {
         Vec3::from(CORNERS[i]) / (4.0 * self.size)
     }
 
-    fn placed(&self, x: &[Vec3]) -> Option<Placed> {
+    fn placed<'a>(&self, x: &'a [Vec3]) -> Option<Placed<'a>> {
         let y = self.frame.map(|a| x[a as usize]);
         let F: Mat3 = (0..4).map(|i| y[i] * self.c(i).transpose()).sum();
-        Some(Placed { middle: y.iter().sum::<Vec3>() / 4.0, F_inverse: F.try_inverse()? })
+        Some(Placed { x, middle: y.iter().sum::<Vec3>() / 4.0, F_inverse: F.try_inverse()? })
     }
 
     fn distance(&self, arm: &Vec3) -> Distance {
@@ -177,8 +178,8 @@ impl Contact {
     }
 
     /// Places of a triangle's corners from the middle of the shape at rest, and a bound that none of its points is nearer than.
-    fn arms(&self, placed: &Placed, nodes: &[u32; 3], x: &[Vec3]) -> ([Vec3; 3], f64) {
-        let arms = nodes.map(|a| placed.F_inverse * (x[a as usize] - placed.middle));
+    fn arms(&self, placed: &Placed, nodes: &[u32; 3]) -> ([Vec3; 3], f64) {
+        let arms = nodes.map(|a| placed.F_inverse * (placed.x[a as usize] - placed.middle));
         // No point is further from the first corner than the others are.
         let span = (arms[1] - arms[0]).norm().max((arms[2] - arms[0]).norm());
         (arms, self.distance(&arms[0]).d - span)
@@ -189,14 +190,14 @@ impl Contact {
     fn each_touched(
         &self,
         history: &[f64],
-        (placed, x): (&Placed, &[Vec3]),
-        lag: Option<(&Placed, &[Vec3])>,
+        placed: &Placed,
+        lag: Option<&Placed>,
         e: usize,
         mut touched: impl FnMut(Touched),
     ) -> f64 {
         let (nodes, area) = &self.triangles[e];
-        let (arms, least) = self.arms(placed, nodes, x);
-        let lag = lag.map(|(placed, x)| self.arms(placed, nodes, x)).filter(|(_, least)| *least <= 0.0);
+        let (arms, least) = self.arms(placed, nodes);
+        let lag = lag.map(|placed| self.arms(placed, nodes)).filter(|(_, least)| *least <= 0.0);
         // What is no number is left to the elements to refuse.
         if least.is_nan() || least > 0.0 && lag.is_none() {
             return least;
@@ -238,9 +239,8 @@ impl Contact {
     }
 
     /// The shape at the last iterate, where friction takes its pressures.
-    fn lag<'a>(&self, x_lag: &'a [Vec3]) -> Option<(Placed, &'a [Vec3])> {
-        self.friction.as_ref()?;
-        Some((self.placed(x_lag)?, x_lag))
+    fn lag<'a>(&self, at: &At<'a>) -> Option<Placed<'a>> {
+        self.friction.as_ref().and_then(|_| self.placed(at.x_lag))
     }
 
     fn nodes(&self, [a, b, c]: [u32; 3]) -> [u32; 7] {
@@ -288,22 +288,20 @@ impl Term for Contact {
 
     fn energy(&self, at: &At, x: &[Vec3]) -> f64 {
         let Some(placed) = self.placed(x) else { return f64::INFINITY };
-        let lag = self.lag(at.x_lag);
-        let lag = lag.as_ref().map(|(placed, x)| (placed, *x));
+        let lag = self.lag(at);
         let mut energy = 0.0;
         for e in 0..self.triangles.len() {
-            self.each_touched(at.history, (&placed, x), lag, e, |point| energy += point.energy);
+            self.each_touched(at.history, &placed, lag.as_ref(), e, |point| energy += point.energy);
         }
         energy
     }
 
     fn add_gradient(&self, at: &At, x: &[Vec3], g: &mut [Vec3]) -> f64 {
         let Some(placed) = self.placed(x) else { return f64::INFINITY };
-        let lag = self.lag(at.x_lag);
-        let lag = lag.as_ref().map(|(placed, x)| (placed, *x));
+        let lag = self.lag(at);
         let mut energy = 0.0;
         for (e, (corners, _)) in self.triangles.iter().enumerate() {
-            self.each_touched(at.history, (&placed, x), lag, e, |point| {
+            self.each_touched(at.history, &placed, lag.as_ref(), e, |point| {
                 energy += point.energy;
                 point.add_to(&placed, self.nodes(*corners), &point.force, g);
             });
@@ -317,13 +315,12 @@ impl Term for Contact {
 
     fn add_hessian(&self, at: &At, x: &[Vec3], curvature: Curvature, sink: &mut dyn HessianSink) {
         let placed = self.placed(x);
-        let lag = self.lag(at.x_lag);
-        let lag = lag.as_ref().map(|(placed, x)| (placed, *x));
+        let lag = self.lag(at);
         for (e, (corners, _)) in self.triangles.iter().enumerate() {
             let mut upper = [Mat3::zeros(); 28];
             if let Some(placed) = &placed {
                 let p = [0, 1, 2, 3].map(|i| placed.F_inverse.tr_mul(&self.c(i)));
-                self.each_touched(at.history, (placed, x), lag, e, |point| {
+                self.each_touched(at.history, placed, lag.as_ref(), e, |point| {
                     point.add_stiffness(placed, &p, curvature, &mut upper);
                 });
             }
@@ -337,11 +334,10 @@ impl Term for Contact {
 
     /// The lag is at the solution here, where it is the same place.
     fn add_lag_transposed(&self, at: &At, xi: &[Vec3], out: &mut [Vec3]) {
-        let x = at.x_lag;
-        let (Some(friction), Some(placed)) = (&self.friction, self.placed(x)) else { return };
+        let (Some(friction), Some(placed)) = (&self.friction, self.lag(at)) else { return };
         for (e, (corners, area)) in self.triangles.iter().enumerate() {
             let nodes = self.nodes(*corners);
-            self.each_touched(at.history, (&placed, x), None, e, |point| {
+            self.each_touched(at.history, &placed, None, e, |point| {
                 let Some(origin) = self.origin(friction, at.history, e, point.q) else { return };
                 let traction = |lag: &Vec3| {
                     self.hold(friction.mu, lag, &origin, &point.arm).map_or(Vec3::zeros(), |hold| hold.traction)
@@ -360,11 +356,11 @@ impl Term for Contact {
     }
 
     fn touch(&self, at: &At, x: &[Vec3]) -> Option<Touch> {
-        let mut touch = Touch { reach: self.shape.reach(), ..Touch::NONE };
+        let mut touch = Touch::NONE;
         let Some(placed) = self.placed(x) else { return Some(touch) };
-        let lag = self.friction.is_some().then_some((&placed, x));
+        let lag = self.friction.is_some().then_some(&placed);
         for e in 0..self.triangles.len() {
-            let nearest = self.each_touched(at.history, (&placed, x), lag, e, |point| {
+            let nearest = self.each_touched(at.history, &placed, lag, e, |point| {
                 touch.force += placed.F_inverse.tr_mul(&point.force);
             });
             touch.gap = touch.gap.min(nearest);
@@ -381,7 +377,7 @@ impl Term for Contact {
         for e in 0..self.triangles.len() {
             let first = friction.first + REMEMBERED * POINTS.len() * e;
             history[first..first + REMEMBERED * POINTS.len()].fill(0.0);
-            self.each_touched(at.history, (&placed, x), None, e, |point| {
+            self.each_touched(at.history, &placed, None, e, |point| {
                 let slack = self.origin(friction, at.history, e, point.q).and_then(|origin| {
                     Some(self.hold(friction.mu, &point.arm, &origin, &point.arm)?.traction / self.stiffness)
                 });

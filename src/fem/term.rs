@@ -82,13 +82,11 @@ pub struct Touch {
     pub force: Vec3,
     /// Distance of its nearest point, m, or less where all are outside; negative inside.
     pub gap: f64,
-    /// Depth beyond which a point may be pushed out on the wrong side, m.
-    pub reach: f64,
 }
 
 impl Touch {
     /// No touch at all.
-    pub const NONE: Touch = Touch { force: Vec3::new(0.0, 0.0, 0.0), gap: f64::INFINITY, reach: f64::INFINITY };
+    pub const NONE: Touch = Touch { force: Vec3::new(0.0, 0.0, 0.0), gap: f64::INFINITY };
 
     /// Depth of the deepest point inside it, m; 0 if there is none.
     pub fn depth(&self) -> f64 {

@@ -57,8 +57,8 @@ pub fn documentation(model: &Model, version: FmiVersion, picture: bool) -> Strin
          <h2>Variables</h2>\n<table border=\"1\">\n\
          <tr><th>reference</th><th>name</th><th>type</th><th>unit</th><th>range</th><th>set</th><th>about</th></tr>\n{rows}</table>\n\
          <h2>Limits</h2>\n\
-         <p>Tissue does not touch itself, and touches rigid shapes only where the scene has contacts. Linear tetrahedra come out too stiff above a Poisson's ratio of 0.45 \
-         unless the scene averages their pressure. Steps that could only end with elements turned inside out are discarded, unless the \
+         <p>Tissue does not touch itself, and touches rigid shapes only where the scene has contacts. Linear tetrahedra come out \
+         too stiff above a Poisson's ratio of 0.45 unless the scene averages their pressure. Steps that could only end with elements turned inside out are discarded, unless the \
          scene allows them. A research tool, not a medical device.</p>\n{warnings}\
          <p>cutis {version_number}, {license}; licenses are in <code>documentation/licenses</code>, the scene in \
          <code>resources/scene.toml</code>.</p>\n</body>\n</html>\n",

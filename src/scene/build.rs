@@ -119,8 +119,9 @@ impl Builder<'_> {
         }
         let first_of_contacts = mesh.nodes.len() as u32;
         let mut contacts = Vec::new();
-        for (name, contact) in self.contacts(file, &mut mesh, &mut bones, &mut n_history, &mut warnings)? {
-            contacts.push(sim::Contact { name, frame: contact.frame, surface: contact.shape.surface() });
+        for (name, bone, contact) in self.contacts(file, &mut mesh, &mut bones, &mut n_history, &mut warnings)? {
+            let (reach, surface) = (contact.shape.reach(), contact.shape.surface());
+            contacts.push(sim::Contact { name, bone, frame: contact.frame, term: terms.len(), reach, surface });
             terms.push(Box::new(contact));
         }
         let counts: Vec<(Drive, usize)> = bones.iter().map(|b| (b.drive, b.nodes.len())).collect();

@@ -21,7 +21,7 @@ const SMALLEST: f64 = 1.0;
 const FRAME: f64 = 0.05;
 
 impl Builder<'_> {
-    /// The contacts of a scene. Each adds four nodes to the mesh and to its bone, which move it.
+    /// The contacts of a scene, with their names and bones. Each adds four nodes to the mesh and to its bone, which move it.
     pub(super) fn contacts(
         &self,
         file: &SceneFile,
@@ -29,16 +29,16 @@ impl Builder<'_> {
         bones: &mut [Bone],
         n_history: &mut usize,
         warnings: &mut Vec<String>,
-    ) -> Result<Vec<(String, Contact)>, SceneError> {
+    ) -> Result<Vec<(String, usize, Contact)>, SceneError> {
         let names = self.text.names("contact", file.contact.iter().map(|c| &c.name))?;
         let mut contacts = Vec::new();
         for (name, spec) in names.into_iter().zip(&file.contact) {
-            let mut contact = self.contact(spec, file, mesh, bones, warnings)?;
+            let (bone, mut contact) = self.contact(spec, file, mesh, bones, warnings)?;
             if let Some(mu) = self.text.number("contact", "friction", &spec.friction)?.filter(|mu| *mu > 0.0) {
                 contact.friction = Some(Friction { mu, first: *n_history });
                 *n_history += Contact::memory(contact.triangles.len());
             }
-            contacts.push((name, contact));
+            contacts.push((name, bone, contact));
         }
         let idle = |(spec, bone): &(&BoneSpec, &Bone)| bone.nodes.is_empty() && wants_no_nodes(spec);
         if let Some((spec, _)) = file.bone.iter().zip(&*bones).find(idle) {
@@ -56,7 +56,7 @@ impl Builder<'_> {
         mesh: &mut TetMesh,
         bones: &mut [Bone],
         warnings: &mut Vec<String>,
-    ) -> Result<Contact, SceneError> {
+    ) -> Result<(usize, Contact), SceneError> {
         let at = spec.name.span().start;
         let shape = self.shape(spec)?;
         let faces = spec.faces.as_ref().map_or(SKIN, |f| f.get_ref());
@@ -87,9 +87,10 @@ impl Builder<'_> {
             Some(stiffness) => stiffness,
             None => STIFFNESS / edge * small_strain(self.text.0, file)?.iter().map(|t| t.E).fold(0.0, f64::max),
         };
-        let carrier = bones.iter_mut().find(|b| b.name == *spec.bone.get_ref()).ok_or_else(|| {
+        let bone = bones.iter().position(|b| b.name == *spec.bone.get_ref()).ok_or_else(|| {
             self.text.unknown("bone", &spec.bone, file.bone.iter().map(|b| b.name.get_ref().as_str()))
         })?;
+        let carrier = &mut bones[bone];
         if carrier.drive == Drive::Displacement {
             let message = format!("bone `{}` is {}: a rigid shape wants one pose", carrier.name, carrier.drive);
             return Err(self.text.at(spec.bone.span().start, message));
@@ -107,7 +108,8 @@ impl Builder<'_> {
         let frame = [0, 1, 2, 3].map(|i| first + i);
         mesh.nodes.extend(Contact::corners(middle, size));
         carrier.nodes.extend(frame);
-        Ok(Contact { shape, middle, frame, size, triangles, stiffness, onset: ONSET * edge, friction: None })
+        let onset = ONSET * edge;
+        Ok((bone, Contact { shape, middle, frame, size, triangles, stiffness, onset, friction: None }))
     }
 
     fn shape(&self, spec: &ContactSpec) -> Result<Shape, SceneError> {

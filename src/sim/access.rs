@@ -190,9 +190,7 @@ impl View<'_> {
     /// How contact `k` touches.
     fn touch(&self, k: usize) -> Touch {
         let at = At { history: &self.state.history, ..At::NOWHERE };
-        let x = &self.state.config.x;
-        let mut touches = self.model.parts().terms.iter().filter_map(|term| term.touch(&at, x));
-        touches.nth(k).unwrap_or(Touch::NONE)
+        self.model.touch(k, &at, &self.state.config.x)
     }
 
     /// A nodal field at a marker.

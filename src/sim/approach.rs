@@ -7,10 +7,10 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::model::Model;
+use super::model::{Contact, Drive, Model};
 use super::pace::even_part;
-use super::step::{place_bones, target};
-use crate::fem::{At, Configuration, Role, Touch};
+use super::step::place_bones;
+use crate::fem::{At, Configuration};
 use crate::math::Vec3;
 use crate::solve::SolveError;
 
@@ -38,19 +38,21 @@ impl Approach<'_> {
     pub fn part(&self, inputs: &mut [f64], there: &mut Configuration) -> (f64, bool) {
         let Approach { model, config, done, smallest, .. } = *self;
         let (mut part, mut is_sure) = (1.0 - done, true);
-        if model.parts().contacts.is_empty() {
-            return (part, is_sure);
+        if !model.parts().contacts.is_empty() {
+            there.copy_from(config);
         }
-        there.copy_from(config);
-        for (k, reach) in each(model, &config.x).map(|(k, touch)| (k, touch.reach)).filter(|(_, r)| r.is_finite()) {
+        for (k, Contact { frame, reach, .. }) in
+            model.parts().contacts.iter().enumerate().filter(|(_, c)| c.reach.is_finite())
+        {
             self.place(self.to, k, there);
             // A turn by less than half of a circle is no longer than this many chords.
-            let way = FRAC_PI_2 * chord(model, k, &config.x, &there.x) / (1.0 - done);
+            let chord = frame.iter().map(|&a| (there.x[a as usize] - config.x[a as usize]).norm()).fold(0.0, f64::max);
+            let way = FRAC_PI_2 * chord / (1.0 - done);
             let safe = SAFE * reach / way;
             if safe >= 1.0 - done {
                 continue;
             }
-            let touched = self.touched(k, reach, way, inputs, there);
+            let touched = self.touched(k, *reach, way, inputs, there);
             if touched - done > smallest {
                 part = part.min(touched - done);
             } else {
@@ -68,7 +70,7 @@ impl Approach<'_> {
                 *now = from + s * (to - from);
             }
             self.place(inputs, k, there);
-            each(self.model, &there.x).nth(k).map_or(f64::INFINITY, |(_, touch)| touch.gap)
+            self.model.touch(k, &At::NOWHERE, &there.x).gap
         };
         let mut s = self.done;
         for _ in 0..LOOKS {
@@ -90,34 +92,23 @@ impl Approach<'_> {
     fn place(&self, inputs: &[f64], k: usize, there: &mut Configuration) {
         let parts = self.model.parts();
         place_bones(self.model, inputs, there);
-        let frame = parts.contacts[k].frame;
+        let &Contact { bone, frame, .. } = &parts.contacts[k];
         // Where a force-driven bone will go is not known.
-        let Some(b) = parts.bones.iter().position(|b| b.nodes.binary_search(&frame[0]).is_ok()) else { return };
-        for a in frame.into_iter().filter(|a| matches!(self.model.dofs().role[*a as usize], Role::Prescribed(_))) {
-            let Ok(n) = parts.bones[b].nodes.binary_search(&a) else { continue };
-            there.x[a as usize] = target(self.model, inputs, self.pivots, &there.poses, b, n);
+        if parts.bones[bone].drive != Drive::Force {
+            for a in frame.map(|a| a as usize) {
+                there.x[a] = there.poses[bone].place(&self.pivots[bone], &parts.mesh.nodes[a]);
+            }
         }
     }
 }
 
-fn chord(model: &Model, k: usize, from: &[Vec3], to: &[Vec3]) -> f64 {
-    let frame = model.parts().contacts[k].frame.map(|a| a as usize);
-    frame.into_iter().map(|a| (to[a] - from[a]).norm()).fold(0.0, f64::max)
-}
-
 /// Refuses tissue at `x` that lies deeper in a shape than it can tell its sides.
 pub(super) fn check_depth(model: &Model, x: &[Vec3]) -> Result<(), SolveError> {
-    match each(model, x).find(|(_, touch)| touch.depth() > SAFE * touch.reach) {
-        Some((k, touch)) => Err(SolveError::TooDeep {
-            contact: model.parts().contacts[k].name.clone(),
-            depth: touch.depth(),
-            most: SAFE * touch.reach,
-        }),
-        None => Ok(()),
+    for (k, Contact { name, reach, .. }) in model.parts().contacts.iter().enumerate() {
+        let (depth, most) = (model.touch(k, &At::NOWHERE, x).depth(), SAFE * reach);
+        if depth > most {
+            return Err(SolveError::TooDeep { contact: name.clone(), depth, most });
+        }
     }
-}
-
-fn each<'a>(model: &'a Model, x: &'a [Vec3]) -> impl Iterator<Item = (usize, Touch)> + 'a {
-    let terms = if model.parts().contacts.is_empty() { &[][..] } else { &model.parts().terms };
-    terms.iter().filter_map(|term| term.touch(&At::NOWHERE, x)).enumerate()
+    Ok(())
 }

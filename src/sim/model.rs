@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use super::ports::{Layout, table};
 use super::scheme::Scheme;
 use super::skin::Skin;
-use crate::fem::{Assembly, Dofs, Elimination, Embedding, Term};
+use crate::fem::{Assembly, At, Dofs, Elimination, Embedding, Term, Touch};
 use crate::math::{Mat3, Vec3, svd};
 use crate::mesh::{FineSkin, TetMesh};
 use crate::port::Port;
@@ -62,8 +62,14 @@ pub struct Marker {
 pub struct Contact {
     /// Name, unique among the contacts.
     pub name: String,
+    /// The bone that carries it.
+    pub bone: usize,
     /// Nodes of the bone that move it.
     pub frame: [u32; 4],
+    /// The term that it is.
+    pub term: usize,
+    /// Depth beyond which a point of the tissue may be pushed out on the wrong side, m.
+    pub reach: f64,
     /// What it looks like at rest; no triangles where it has no end.
     pub surface: FineSkin,
 }
@@ -130,7 +136,7 @@ pub struct ModelParts {
     pub loads: Vec<String>,
     /// Names of the pressure loads, in order.
     pub pressures: Vec<String>,
-    /// Contacts, in the order of their terms.
+    /// Contacts, in order.
     pub contacts: Vec<Contact>,
     /// Markers, in order.
     pub markers: Vec<Marker>,
@@ -229,6 +235,11 @@ impl Model {
     /// Whether its state depends on the way it came: by inertia, or by tissue with a memory.
     pub fn remembers(&self) -> bool {
         self.parts.inertia.is_some() || self.parts.n_history > 0
+    }
+
+    /// How contact `k` touches at `x`.
+    pub(super) fn touch(&self, k: usize, at: &At, x: &[Vec3]) -> Touch {
+        self.parts.terms[self.parts.contacts[k].term].touch(at, x).unwrap_or(Touch::NONE)
     }
 
     /// Name of the scene.
