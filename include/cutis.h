@@ -69,9 +69,16 @@ typedef enum CutisStatus {
   CUTIS_BUSY = 5,
   // A defect of the library was caught; only cutis_sim_message and cutis_sim_free still answer.
   CUTIS_PANIC = 6,
+  // cutis_sim_cancel ended the call; the simulation stands at its last accepted step.
+  CUTIS_CANCELLED = 7,
 } CutisStatus;
 
 // A face that moves: the scene, where it stands, and the solver's memory.
+//
+// Every call computes in the default floating-point environment and gives the caller's back: traps and rounding modes of the
+// caller change no bit. What would not fit into memory at all is refused where the simulation is made; where the system runs out
+// of memory within a call, the process is aborted (allocation failure), as in most C++ libraries: make sure that
+// cutis_sim_memory bytes are there for each simulation.
 //
 // Every function may be called from any thread, on one handle by one thread at a time; handles are independent. A handle
 // starts a thread only where its scene asks for one (`[solver] threads`, `background`), and ends it when it is freed.
@@ -252,7 +259,9 @@ enum CutisStatus cutis_port_range(const struct CutisSim *sim,
 
 // Sets all values of an input or parameter, row-major, in the port's SI unit. Nothing is computed or allocated.
 //
-// CUTIS_ARGUMENT: no such port, it cannot be set, `len` is not its length, or a value is not finite or out of range.
+// CUTIS_ARGUMENT: no such port, it cannot be set (a CUTIS_PARAMETER after cutis_sim_initialise), `len` is not its length, a
+// value is not finite or out of the range that cutis_port_range tells, or it moves or pushes a bone that is not driven that way;
+// nothing was set then.
 //
 // # Safety
 // `sim` is NULL or a live handle; `values` is NULL or holds `len` numbers.
@@ -268,6 +277,18 @@ enum CutisStatus cutis_sim_set_f64(struct CutisSim *sim,
 // # Safety
 // `sim` is NULL or a live handle; `values` is NULL or holds `len` numbers.
 enum CutisStatus cutis_sim_get_f64(const struct CutisSim *sim, size_t port, double *values, size_t len);
+
+// Sets all values of an Int32 parameter: of "solver.mostSolves", the linear solves that a step may take at most. Nothing is
+// computed or allocated.
+//
+// CUTIS_ARGUMENT: no such port, it cannot be set, `len` is not its length, or a value is out of range; nothing was set then.
+//
+// # Safety
+// `sim` is NULL or a live handle; `values` is NULL or holds `len` numbers.
+enum CutisStatus cutis_sim_set_i32(struct CutisSim *sim,
+                                   size_t port,
+                                   const int32_t *values,
+                                   size_t len);
 
 // Copies all values of an Int32 port, row-major. Nothing is computed or allocated.
 //
@@ -287,15 +308,17 @@ enum CutisStatus cutis_sim_get_bool(const struct CutisSim *sim, size_t port, uin
 
 // Sets the start time, s; before cutis_sim_initialise.
 //
-// CUTIS_ARGUMENT: `time` is not finite.
+// CUTIS_ARGUMENT: `time` is not finite, or the simulation was initialised, stepped or restored and not reset since.
 //
 // # Safety
 // `sim` is NULL or a live handle.
-enum CutisStatus cutis_sim_set_time(struct CutisSim *sim, double time);
+enum CutisStatus cutis_sim_set_time(struct CutisSim *sim,
+                                    double time);
 
-// Finds the equilibrium at the start values of inputs and parameters; no time passes. Call it once, before stepping.
+// Finds the equilibrium at the start values of inputs and parameters, from rest; no time passes. Call it once, before stepping.
 //
-// CUTIS_STEP: there is none within the solver's means; nothing has changed.
+// CUTIS_STEP: there is none within the solver's means; nothing has changed. CUTIS_ARGUMENT: a state was restored or positions
+// were set and no step made since, which would be dropped: step on, or call cutis_sim_reset first.
 //
 // # Safety
 // `sim` is NULL or a live handle.
@@ -303,8 +326,9 @@ enum CutisStatus cutis_sim_initialise(struct CutisSim *sim);
 
 // Advances by `dt` seconds with the inputs as they stand now.
 //
-// CUTIS_ARGUMENT: `dt` is not positive and finite. CUTIS_STEP: the step failed. In both cases the simulation stands at
-// its last accepted step.
+// CUTIS_ARGUMENT: `dt` is not positive and finite. CUTIS_STEP: the step failed, or would have taken more linear solves than
+// solver.mostSolves. CUTIS_CANCELLED: cutis_sim_cancel was called meanwhile. In all cases the simulation stands at its last
+// accepted step.
 //
 // # Safety
 // `sim` is NULL or a live handle.
@@ -315,7 +339,7 @@ enum CutisStatus cutis_sim_step(struct CutisSim *sim,
 // `t` is the time already.
 //
 // CUTIS_ARGUMENT: `t` lies before the time or is not finite, `dt` is not positive and finite, or it would take more than a
-// million steps. CUTIS_STEP: a step failed; the simulation then stands at its last accepted step, and cutis_sim_time tells
+// million steps. CUTIS_STEP, CUTIS_CANCELLED: as for cutis_sim_step; the simulation then stands at its last accepted step, and cutis_sim_time tells
 // how far it came.
 //
 // # Safety
@@ -324,16 +348,55 @@ enum CutisStatus cutis_sim_run_until(struct CutisSim *sim,
                                      double t,
                                      double dt);
 
+// Ends the cutis_sim_initialise, cutis_sim_step or cutis_sim_run_until that is under way on another thread before its next linear
+// solve: that call then answers CUTIS_CANCELLED, and the simulation stands at its last accepted step. Nothing where no call is
+// under way. The one function that may be called while another thread is inside the handle.
+//
+// # Safety
+// `sim` is NULL or a live handle that is not freed meanwhile.
+enum CutisStatus cutis_sim_cancel(struct CutisSim *sim);
+
+// Number of nodes of the solver's mesh; 0 for NULL, busy and failed handles. The skin is part of them, or rides on them.
+//
+// # Safety
+// `sim` is NULL or a live handle.
+size_t cutis_node_count(const struct CutisSim *sim);
+
+// Copies the current positions of all nodes, m: three numbers a node.
+//
+// CUTIS_ARGUMENT: `len` is not three times cutis_node_count; `positions` is untouched then.
+//
+// # Safety
+// `sim` is NULL or a live handle; `positions` is NULL or holds `len` numbers.
+enum CutisStatus cutis_sim_nodes(const struct CutisSim *sim, double *positions, size_t len);
+
+// Puts the nodes that no bone holds at `positions` (m, three numbers for each node of cutis_sim_nodes): the next step seeks the
+// equilibrium from there. Nodes of bones, time, velocities and outputs stay as they are until then.
+//
+// CUTIS_ARGUMENT: `len` is not three times cutis_node_count, or a position is not finite; nothing has changed then.
+//
+// # Safety
+// `sim` is NULL or a live handle; `positions` is NULL or holds `len` numbers.
+enum CutisStatus cutis_sim_start_from(struct CutisSim *sim,
+                                      const double *positions,
+                                      size_t len);
+
+// Bytes of matrices, factor and solver of a simulation, its model and state left out; 0 for NULL, busy and failed handles.
+//
+// # Safety
+// `sim` is NULL or a live handle.
+size_t cutis_sim_memory(const struct CutisSim *sim);
+
 // Change of `unknowns` with `knowns` along `seed`: the Jacobian of the last accepted equilibrium times a vector; in scenes with
 // inertia or memory that of the last step (of its last piece, where it was cut), the state before it held.
 //
-// `unknowns` are ports that depend on the equilibrium (skin.position, skin.velocity, marker.position, bone.reactionForce,
-// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
+// `unknowns` are Float64 outputs (of skin, markers, bones, contacts and energies; not those of solver and quality) or inputs,
+// `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
 // row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
 //
-// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `knowns` and `unknowns`. CUTIS_STEP:
-// there is no equilibrium yet, or in scenes with inertia or memory no step of this handle led to the state (it was restored).
-// `sensitivity` is then of no use.
+// CUTIS_ARGUMENT: no such ports, the seed is not finite, or `seed_len` or `sensitivity_len` are not the values of `knowns` and `unknowns`. CUTIS_STEP:
+// there is no equilibrium yet, or in scenes with inertia or memory positions were set since the last step. `sensitivity` is then of
+// no use.
 //
 // # Safety
 // `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
@@ -349,13 +412,13 @@ enum CutisStatus cutis_sim_directional_derivative(struct CutisSim *sim,
 
 // Gradient of the `unknowns` weighted by `seed` by all `knowns` at once: the transposed Jacobian times a vector.
 //
-// `unknowns` are ports that depend on the equilibrium (skin.position, skin.velocity, marker.position, bone.reactionForce,
-// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
+// `unknowns` are Float64 outputs (of skin, markers, bones, contacts and energies; not those of solver and quality) or inputs,
+// `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
 // row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
 //
-// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `unknowns` and `knowns`. CUTIS_STEP:
-// there is no equilibrium yet, or in scenes with inertia or memory no step of this handle led to the state (it was restored).
-// `sensitivity` is then of no use.
+// CUTIS_ARGUMENT: no such ports, the seed is not finite, or `seed_len` or `sensitivity_len` are not the values of `unknowns` and `knowns`. CUTIS_STEP:
+// there is no equilibrium yet, or in scenes with inertia or memory positions were set since the last step. `sensitivity` is then of
+// no use.
 //
 // # Safety
 // `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
@@ -387,13 +450,15 @@ enum CutisStatus cutis_sim_reset(struct CutisSim *sim);
 // `sim` is NULL or a live handle.
 struct CutisState *cutis_sim_save(const struct CutisSim *sim);
 
-// Goes back to a saved state: from then on every step has the same bits as after the save.
+// Goes back to a saved state: from then on every step has the same bits as after the save. A simulation that is new goes on from
+// there, too: it is not to be initialised then.
 //
-// CUTIS_STATE: it belongs to another scene.
+// CUTIS_STATE: it belongs to another scene, be it one of the same mesh with another material; nothing was changed.
 //
 // # Safety
 // `sim` is NULL or a live handle; `state` is NULL or a live state.
-enum CutisStatus cutis_sim_restore(struct CutisSim *sim, const struct CutisState *state);
+enum CutisStatus cutis_sim_restore(struct CutisSim *sim,
+                                   const struct CutisState *state);
 
 // Frees a saved state. NULL is no error.
 //
@@ -401,18 +466,18 @@ enum CutisStatus cutis_sim_restore(struct CutisSim *sim, const struct CutisState
 // `state` is NULL or a live state that no other thread uses.
 void cutis_state_free(struct CutisState *state);
 
-// Bytes that cutis_state_serialize needs for `state`; 0 on failure.
+// Bytes that cutis_state_serialize needs for `state`; 0 on failure, and for a state of another scene.
 //
 // # Safety
-// `sim` is NULL or a live handle of the state's scene; `state` is NULL or a live state.
+// `sim` is NULL or a live handle; `state` is NULL or a live state.
 size_t cutis_state_size(const struct CutisSim *sim, const struct CutisState *state);
 
 // Writes `state` as bytes that another process can read: little-endian, with format number, scene and checksum.
 //
-// CUTIS_ARGUMENT: `len` is less than cutis_state_size.
+// CUTIS_ARGUMENT: `len` is less than cutis_state_size. CUTIS_STATE: it belongs to another scene.
 //
 // # Safety
-// `sim` is NULL or a live handle of the state's scene; `state` is NULL or a live state; `bytes` is NULL or holds `len`
+// `sim` is NULL or a live handle; `state` is NULL or a live state; `bytes` is NULL or holds `len`
 // bytes.
 enum CutisStatus cutis_state_serialize(const struct CutisSim *sim,
                                        const struct CutisState *state,

@@ -17,6 +17,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -28,7 +29,7 @@ namespace cutis {
 class Error : public std::runtime_error {
   public:
     Error(CutisStatus status, const std::string &message) : std::runtime_error(message), status_(status) {}
-    /// One of CUTIS_NULL ... CUTIS_PANIC.
+    /// One of CUTIS_NULL ... CUTIS_CANCELLED.
     CutisStatus status() const noexcept { return status_; }
 
   private:
@@ -39,7 +40,9 @@ class Error : public std::runtime_error {
 template <class T> class View {
   public:
     View(T *data, std::size_t size) : data_(data), size_(size) {}
-    template <class Container> View(Container &&c) : data_(c.data()), size_(c.size()) {}
+    /// Of anything that has its numbers in one piece and of this type: std::vector, std::array, std::span.
+    template <class Container, class = std::enable_if_t<std::is_convertible_v<decltype(std::declval<Container &>().data()), T *>>>
+    View(Container &&c) : data_(c.data()), size_(c.size()) {}
     T *data() const noexcept { return data_; }
     std::size_t size() const noexcept { return size_; }
     T *begin() const noexcept { return data_; }
@@ -136,6 +139,22 @@ class Sim {
         check(cutis_port_range(sim(), port, &bounds.first, &bounds.second));
         return bounds;
     }
+    /// Names of the rows of a port (bones, loads, markers); empty where they have none.
+    std::vector<std::string> rows(std::size_t port) const {
+        std::vector<std::string> names;
+        for (std::size_t k = 0; k < cutis_port_dim(sim(), port, 0); ++k) {
+            if (cutis_port_row(sim(), port, k, nullptr, 0) == 0) break;
+            names.push_back(text([&](char *b, std::size_t n) { return cutis_port_row(sim(), port, k, b, n); }));
+        }
+        return names;
+    }
+    /// Row of this name in a port; throws CUTIS_ARGUMENT if there is none.
+    std::size_t row(std::size_t port, const std::string &name) const {
+        const std::vector<std::string> names = rows(port);
+        for (std::size_t k = 0; k < names.size(); ++k)
+            if (names[k] == name) return k;
+        throw Error(CUTIS_ARGUMENT, "no row is named `" + name + "`");
+    }
     /// Number type of a port.
     CutisType type(std::size_t port) const { return cutis_port_type(sim(), port); }
     /// Who writes a port.
@@ -144,6 +163,10 @@ class Sim {
     /// Copies values into an input; they act at the next step.
     void set(std::size_t port, View<const double> values) {
         check(cutis_sim_set_f64(sim(), port, values.data(), values.size()));
+    }
+    /// Sets an Int32 parameter, for example `solver.mostSolves`.
+    void set_int(const std::string &name, std::int32_t value) {
+        check(cutis_sim_set_i32(sim(), port(name), &value, 1));
     }
     void set(const std::string &name, std::initializer_list<double> values) {
         set(port(name), View<const double>(values.begin(), values.size()));
@@ -158,6 +181,22 @@ class Sim {
     void get(std::size_t port, View<std::int32_t> values) const {
         check(cutis_sim_get_i32(sim(), port, values.data(), values.size()));
     }
+    void get(const std::string &name, View<double> values) const { get(port(name), values); }
+    void get(const std::string &name, View<std::int32_t> values) const { get(port(name), values); }
+
+    /// Positions of all nodes of the solver's mesh, m: three numbers a node.
+    std::vector<double> nodes() const {
+        std::vector<double> x(3 * cutis_node_count(sim()));
+        check(cutis_sim_nodes(sim(), x.data(), x.size()));
+        return x;
+    }
+    /// Puts the nodes that no bone holds there; the next step seeks the equilibrium from these positions.
+    void start_from(View<const double> x) { check(cutis_sim_start_from(sim(), x.data(), x.size())); }
+    /// Ends a step that is under way on another thread; it throws CUTIS_CANCELLED there.
+    void cancel() noexcept { cutis_sim_cancel(sim()); }
+    /// Bytes of matrices, factor and solver.
+    std::size_t memory() const { return cutis_sim_memory(sim()); }
+
     /// Change of the ports `unknowns` with the ports `knowns` along `seed`, at the last accepted equilibrium.
     std::vector<double> directional_derivative(const std::vector<std::size_t> &unknowns,
                                                const std::vector<std::size_t> &knowns,

@@ -131,10 +131,7 @@ fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, E
     let mut mesh = mesh_of(text, &file, path, folder)?;
     let (model, _) = build(text, &file, mesh.clone()).map_err(|e| scene_error(path, e))?;
     mesh.elimination = model.elimination();
-    let order = file.order().map_or(String::new(), |order| format!("order = {order}\n"));
-    let curved = if file.curved() { "curved = true\n" } else { "" };
-    let replaced = replace_mesh_table(text, &format!("[mesh]\nfile = \"{BAKED_NAME}\"\n{order}{curved}"));
-    Ok(Baked { scene: replaced, mesh: io::encode(&mesh) })
+    Ok(Baked { scene: scene::packed(text, BAKED_NAME), mesh: io::encode(&mesh) })
 }
 
 fn read(path: &Path) -> Result<String, Error> {
@@ -180,26 +177,4 @@ fn mesh_of(text: &str, file: &SceneFile, path: &Path, folder: Option<&Path>) -> 
 
 fn beside(folder: Option<&Path>, name: &str) -> PathBuf {
     folder.map_or_else(|| PathBuf::from(name), |f| f.join(name))
-}
-
-/// `text` with its `[mesh...]` tables replaced and without a `[skin]`, which the baked mesh carries; the new table stands where the first one stood.
-fn replace_mesh_table(text: &str, table: &str) -> String {
-    let mut out = String::new();
-    let (mut inside, mut written) = (false, false);
-    for line in text.lines() {
-        if line.trim_start().starts_with('[') {
-            let name = line.trim_start().trim_start_matches('[').trim_start();
-            let is_mesh = name.starts_with("mesh");
-            inside = is_mesh || name.starts_with("skin");
-            if is_mesh && !written {
-                out += table;
-                written = true;
-            }
-        }
-        if !inside {
-            out += line;
-            out.push('\n');
-        }
-    }
-    out
 }

@@ -26,6 +26,8 @@ pub enum Slot {
     BoneNodal(u32),
     /// Young's modulus of one tunable tissue (index into those).
     MaterialE(u32),
+    /// Most linear solves of a step.
+    MostSolves,
     /// Gravity.
     Gravity,
     /// Pivot of each bone.
@@ -88,6 +90,8 @@ pub enum Causality {
     Input,
     /// Computed by each step.
     Output,
+    /// Computed by each step, and of no use to other components: how the solver fared, how the elements are.
+    Local,
     /// Set by the host before initialization ends.
     Parameter,
     /// A parameter that the host may set at any communication point, too.
@@ -117,6 +121,8 @@ pub struct Port {
     pub causality: Causality,
     /// Start values (row-major), or one value for all; empty for calculated ports.
     pub start: Vec<f64>,
+    /// Size that its values have in life, in its unit.
+    pub nominal: f64,
     /// Smallest legal value.
     pub min: Option<f64>,
     /// Largest legal value.
@@ -143,8 +149,14 @@ impl Port {
         matches!(self.causality, Causality::Input | Causality::Parameter | Causality::TunableParameter)
     }
 
-    /// Whether its value can change from one step to the next.
+    /// Whether each step computes it.
+    pub fn is_computed(&self) -> bool {
+        matches!(self.causality, Causality::Output | Causality::Local)
+    }
+
+    /// Whether its value can change from one step to the next; the bound on a step is no value of the tissue.
     pub fn is_continuous(&self) -> bool {
         !matches!(self.causality, Causality::Parameter | Causality::CalculatedParameter)
+            && self.slot != Slot::MostSolves
     }
 }

@@ -11,6 +11,8 @@ mod common;
 mod compare;
 #[path = "verify/contact.rs"]
 mod contact;
+#[path = "verify/declared.rs"]
+mod declared;
 #[path = "verify/derivatives.rs"]
 mod derivatives;
 #[path = "verify/elimination.rs"]

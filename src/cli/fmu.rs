@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use cutis::ffi::host;
 use cutis::fmu::{Binary, FmiVersion, Platform, package};
 use cutis::{io, load};
 
@@ -52,7 +53,8 @@ pub fn own_binary(library: Option<&Path>) -> Result<Vec<Binary>, Box<dyn std::er
     Ok(vec![Binary { platform: Platform::here()?, bytes: io::read_bytes(&path)? }])
 }
 
-/// Writes both archives, or all three, into `out`; returns their paths and sizes.
+/// Writes both archives, or all three, into `out`, once each was instantiated as a host does it; returns their paths and sizes.
+/// What cannot be instantiated leaves an older archive as it was. A library of another machine is not tried.
 pub fn write(
     scene: Option<&Path>,
     binaries: Vec<Binary>,
@@ -69,7 +71,15 @@ pub fn write(
     for version in [FmiVersion::V3, FmiVersion::V2, FmiVersion::V2Full].into_iter().take(if full { 3 } else { 2 }) {
         let archive = package(&loaded, &baked, &binaries, version)?;
         let path = out.join(version.archive_name());
-        io::write_bytes(&path, &archive)?;
+        let tried = out.join(format!("{}.part", version.archive_name()));
+        io::write_bytes(&tried, &archive)?;
+        let here = Platform::here().is_ok_and(|here| binaries.iter().any(|b| b.platform == here));
+        let answer = if here { host::instantiate(&tried, version) } else { Ok(()) };
+        if let Err(why) = answer {
+            io::remove_file(&tried)?;
+            return Err(format!("{} was not written, for no host could open it: {why}", path.display()).into());
+        }
+        io::rename(&tried, &path)?;
         written.push((path, archive.len()));
     }
     Ok(written)

@@ -36,14 +36,15 @@ impl Study {
         let mut plan = Plan::new(&text, folder, &self.mesh, self.quick)?;
         io::create_folder(&self.out)?;
         // The reference takes the finest mesh whose quadratic elements are not too many.
-        let finest = loop {
-            let finest = load::from_text(&plan.text(&plan.reference), folder)?.model;
-            if 3 * finest.dofs().n_blocks() <= self.most_unknowns || plan.reference.level == 0 {
-                break finest;
+        let (finest, programme) = loop {
+            let load::Loaded { model, programme } = load::from_text(&plan.text(&plan.reference), folder)?;
+            if 3 * model.dofs().n_blocks() <= self.most_unknowns || plan.reference.level == 0 {
+                break (model, programme);
             }
             plan.reference.level -= 1;
         };
-        let identity = format!("{} {:?} {} {}", finest.token(), self.mesh, self.quick, self.most_unknowns);
+        let identity =
+            format!("{} {programme:?} {:?} {} {}", finest.token(), self.mesh, self.quick, self.most_unknowns);
         let mut meshes = Vec::new();
         for level in 0..plan.levels.len() {
             meshes.push(load::mesh(&plan.text(&Variant { level, ..plan.reference.clone() }), folder)?);

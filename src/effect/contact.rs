@@ -355,6 +355,24 @@ impl Term for Contact {
         }
     }
 
+    /// The deepest point goes along -n of the shape: nothing of it turns with the point, since it is the deepest.
+    fn add_depth_gradient(&self, weight: f64, x: &[Vec3], out: &mut [Vec3]) {
+        let Some(placed) = self.placed(x) else { return };
+        let mut deepest: Option<(f64, usize, Touched)> = None;
+        for e in 0..self.triangles.len() {
+            self.each_touched(&[], &placed, None, e, |point| {
+                let d = self.distance(&point.arm).d;
+                if deepest.as_ref().is_none_or(|(least, ..)| d < *least) {
+                    deepest = Some((d, e, point));
+                }
+            });
+        }
+        if let Some((_, e, point)) = deepest {
+            let by = -weight * self.distance(&point.arm).n;
+            point.add_to(&placed, self.nodes(self.triangles[e].0), &by, out);
+        }
+    }
+
     fn touch(&self, at: &At, x: &[Vec3]) -> Option<Touch> {
         let mut touch = Touch::NONE;
         let Some(placed) = self.placed(x) else { return Some(touch) };

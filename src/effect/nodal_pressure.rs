@@ -211,6 +211,9 @@ impl Term for NodalPressure {
     fn is_quadratic(&self) -> bool {
         self.volume == Volume::Linear
     }
+    fn is_elastic(&self) -> bool {
+        true
+    }
     fn strain(&self, at: &At, x: &[Vec3]) -> Strain {
         Strain { energy: self.energy(at, x), ..Strain::NONE }
     }

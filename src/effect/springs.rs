@@ -93,6 +93,9 @@ impl Kernel<2> for Springs {
         let H = self.0[e].k * (nn + across * (Mat3::identity() - nn));
         upper.copy_from_slice(&[H, -H, H]);
     }
+    fn is_elastic(&self) -> bool {
+        true
+    }
     fn strain(&self, at: &At, e: usize, x: &[Vec3; 2]) -> Strain {
         let stretch = self.state(e, x).0 / self.0[e].L;
         Strain { min_det_f: stretch, max_stretch: stretch, energy: self.energy(at, e, x) }

@@ -248,6 +248,9 @@ impl<M: Material, const N: usize, const Q: usize> Kernel<N> for Solid<M, N, Q> {
             each_hessian(self, at, x, curvature, sink);
         }
     }
+    fn is_elastic(&self) -> bool {
+        self.material.is_elastic()
+    }
     fn strain(&self, at: &At, e: usize, x: &[Vec3; N]) -> Strain {
         if !self.material.is_elastic() {
             return Strain::NONE;

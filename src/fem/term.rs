@@ -157,6 +157,14 @@ pub trait Term: Send + Sync {
         Strain::NONE
     }
 
+    /// Whether `strain` counts its energy; the gradient is then that of this energy.
+    fn is_elastic(&self) -> bool {
+        false
+    }
+
+    /// Adds `weight` times the gradient of its depth at `x` to a nodal field, for terms that are contacts.
+    fn add_depth_gradient(&self, _weight: f64, _x: &[Vec3], _out: &mut [Vec3]) {}
+
     /// How it touches at `x`, for terms that are contacts.
     fn touch(&self, _at: &At, _x: &[Vec3]) -> Option<Touch> {
         None
@@ -200,6 +208,8 @@ pub trait Kernel<const N: usize>: Send + Sync {
     {
         each_hessian(self, at, x, curvature, sink);
     }
+    /// Whether `strain` counts its energy.
+    fn is_elastic(&self) -> bool;
     /// Strain of element `e`.
     fn strain(&self, at: &At, e: usize, x: &[Vec3; N]) -> Strain;
     /// Whether the energy is quadratic in the positions.
@@ -283,6 +293,10 @@ impl<K: Kernel<N>, const N: usize> Term for OnElements<K, N> {
 
     fn strain(&self, at: &At, x: &[Vec3]) -> Strain {
         (0..self.0.len()).fold(Strain::NONE, |s, e| s.and(self.0.strain(at, e, &self.gather(e, x).1)))
+    }
+
+    fn is_elastic(&self) -> bool {
+        self.0.is_elastic()
     }
 
     fn remembers(&self) -> bool {

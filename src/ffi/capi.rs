@@ -12,8 +12,9 @@ use super::instance::{Refusal, chain};
 use super::pointer::{self, place};
 use crate::error::Error;
 use crate::load::{self, Loaded};
+use crate::math::Vec3;
 use crate::port::{Causality, Port, Type};
-use crate::sim::{Sim, SimError, State};
+use crate::sim::{Allowance, Sim, SimError, SolveError, State};
 
 /// Moves on a break of the binary interface only; names are added, their meaning never changes.
 const ABI: u32 = 1;
@@ -38,6 +39,8 @@ pub enum CutisStatus {
     CUTIS_BUSY = 5,
     /// A defect of the library was caught; only cutis_sim_message and cutis_sim_free still answer.
     CUTIS_PANIC = 6,
+    /// cutis_sim_cancel ended the call; the simulation stands at its last accepted step.
+    CUTIS_CANCELLED = 7,
 }
 
 /// Number type of a port. Numbers are fixed for ever.
@@ -76,6 +79,11 @@ pub enum CutisCausality {
 
 /// A face that moves: the scene, where it stands, and the solver's memory.
 ///
+/// Every call computes in the default floating-point environment and gives the caller's back: traps and rounding modes of the
+/// caller change no bit. What would not fit into memory at all is refused where the simulation is made; where the system runs out
+/// of memory within a call, the process is aborted (allocation failure), as in most C++ libraries: make sure that
+/// cutis_sim_memory bytes are there for each simulation.
+///
 /// Every function may be called from any thread, on one handle by one thread at a time; handles are independent. A handle
 /// starts a thread only where its scene asks for one (`[solver] threads`, `background`), and ends it when it is freed.
 pub struct CutisSim {
@@ -99,10 +107,37 @@ struct Inner {
     message: String,
     warning: String,
     poisoned: bool,
+    stage: Stage,
+}
+
+/// How far a simulation has come.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// At rest: parameters and time can be set.
+    New,
+    /// A state was restored or a start was set, which cutis_sim_initialise would drop.
+    Set,
+    /// Initialised, or stepped.
+    Running,
+}
+
+impl Inner {
+    /// Fixed parameters and the time are set before the start.
+    fn before_start(&self, what: &str) -> Result<(), Failure> {
+        match self.stage {
+            Stage::New => Ok(()),
+            Stage::Set | Stage::Running => Err(argument(format!(
+                "{what} can be set before cutis_sim_initialise only; cutis_sim_reset goes back to there"
+            ))),
+        }
+    }
 }
 
 impl Guarded for Inner {
     const TAG: u64 = u64::from_le_bytes(*b"cutisSIM");
+    fn allowance(&self) -> Arc<Allowance> {
+        self.sim.allowance().clone()
+    }
     fn poison(&mut self, why: String) {
         self.message = format!("internal failure: {why}");
         self.poisoned = true;
@@ -212,7 +247,7 @@ unsafe fn new_sim(why: *mut c_char, why_len: usize, load: impl FnOnce() -> Resul
     match made.unwrap_or_else(|why| Err(format!("internal failure: {why}"))) {
         Ok(sim) => {
             let warning = sim.model().warnings().join("\n");
-            Handle::leak(Inner { sim, message: String::new(), warning, poisoned: false }).cast()
+            Handle::leak(Inner { sim, message: String::new(), warning, poisoned: false, stage: Stage::New }).cast()
         }
         Err(reason) => {
             // SAFETY: the caller's promise.
@@ -513,7 +548,7 @@ pub unsafe extern "C" fn cutis_port_causality(sim: *const CutisSim, port: usize)
     let answer = |p: &Port| match p.causality {
         Causality::Independent => CutisCausality::CUTIS_INDEPENDENT,
         Causality::Input => CutisCausality::CUTIS_INPUT,
-        Causality::Output => CutisCausality::CUTIS_OUTPUT,
+        Causality::Output | Causality::Local => CutisCausality::CUTIS_OUTPUT,
         Causality::Parameter => CutisCausality::CUTIS_PARAMETER,
         Causality::TunableParameter => CutisCausality::CUTIS_TUNABLE_PARAMETER,
         Causality::CalculatedParameter => CutisCausality::CUTIS_CALCULATED_PARAMETER,
@@ -550,7 +585,9 @@ pub unsafe extern "C" fn cutis_port_range(
 
 /// Sets all values of an input or parameter, row-major, in the port's SI unit. Nothing is computed or allocated.
 ///
-/// CUTIS_ARGUMENT: no such port, it cannot be set, `len` is not its length, or a value is not finite or out of range.
+/// CUTIS_ARGUMENT: no such port, it cannot be set (a CUTIS_PARAMETER after cutis_sim_initialise), `len` is not its length, a
+/// value is not finite or out of the range that cutis_port_range tells, or it moves or pushes a bone that is not driven that way;
+/// nothing was set then.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle; `values` is NULL or holds `len` numbers.
@@ -566,14 +603,21 @@ pub unsafe extern "C" fn cutis_sim_set_f64(
         if !found.is_settable() {
             return Err(argument(format!("`{}` cannot be set: it is {:?}", found.name, found.causality)));
         }
+        if found.causality == Causality::Parameter {
+            inner.before_start(&format!("`{}`", found.name))?;
+        }
         // SAFETY: the caller's promise.
         let values = unsafe { pointer::slice(values, len, "values")? };
         let legal =
             |v: &f64| v.is_finite() && found.min.is_none_or(|min| *v >= min) && found.max.is_none_or(|max| *v <= max);
         if let Some(k) = values.iter().position(|v| !legal(v)) {
             return Err(argument(format!(
-                "element {k} of `{}` was set to {} {}, which is not finite or out of range",
-                found.name, values[k], found.unit
+                "element {k} of `{}` was set to {} {}, wanted a finite value from {} to {}",
+                found.name,
+                values[k],
+                found.unit,
+                found.min.unwrap_or(f64::NEG_INFINITY),
+                found.max.unwrap_or(f64::INFINITY)
             )));
         }
         inner.sim.set_f64(port, 0, values).map_err(|why| argument(chain(&why)))
@@ -603,6 +647,30 @@ pub unsafe extern "C" fn cutis_sim_get_f64(
     };
     // SAFETY: the caller's promise.
     unsafe { with(sim.cast_mut(), body) }
+}
+
+/// Sets all values of an Int32 parameter: of "solver.mostSolves", the linear solves that a step may take at most. Nothing is
+/// computed or allocated.
+///
+/// CUTIS_ARGUMENT: no such port, it cannot be set, `len` is not its length, or a value is out of range; nothing was set then.
+///
+/// # Safety
+/// `sim` is NULL or a live handle; `values` is NULL or holds `len` numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_set_i32(
+    sim: *mut CutisSim,
+    port: usize,
+    values: *const i32,
+    len: usize,
+) -> CutisStatus {
+    let body = |inner: &mut Inner| {
+        exact(inner, port, Type::Int32, len)?;
+        // SAFETY: the caller's promise.
+        let values = unsafe { pointer::slice(values, len, "values")? };
+        inner.sim.set_i32(port, 0, values).map_err(|why| argument(chain(&why)))
+    };
+    // SAFETY: the caller's promise.
+    unsafe { with(sim, body) }
 }
 
 /// Copies all values of an Int32 port, row-major. Nothing is computed or allocated.
@@ -658,7 +726,7 @@ pub unsafe extern "C" fn cutis_sim_get_bool(
 
 /// Sets the start time, s; before cutis_sim_initialise.
 ///
-/// CUTIS_ARGUMENT: `time` is not finite.
+/// CUTIS_ARGUMENT: `time` is not finite, or the simulation was initialised, stepped or restored and not reset since.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle.
@@ -668,6 +736,7 @@ pub unsafe extern "C" fn cutis_sim_set_time(sim: *mut CutisSim, time: f64) -> Cu
         if !time.is_finite() {
             return Err(argument(format!("time {time} is not finite")));
         }
+        inner.before_start("the time")?;
         inner.sim.set_time(time);
         Ok(())
     };
@@ -675,16 +744,23 @@ pub unsafe extern "C" fn cutis_sim_set_time(sim: *mut CutisSim, time: f64) -> Cu
     unsafe { with(sim, body) }
 }
 
-/// Finds the equilibrium at the start values of inputs and parameters; no time passes. Call it once, before stepping.
+/// Finds the equilibrium at the start values of inputs and parameters, from rest; no time passes. Call it once, before stepping.
 ///
-/// CUTIS_STEP: there is none within the solver's means; nothing has changed.
+/// CUTIS_STEP: there is none within the solver's means; nothing has changed. CUTIS_ARGUMENT: a state was restored or positions
+/// were set and no step made since, which would be dropped: step on, or call cutis_sim_reset first.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cutis_sim_initialise(sim: *mut CutisSim) -> CutisStatus {
     let body = |inner: &mut Inner| {
-        let report = inner.sim.initialise().map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))?;
+        if inner.stage == Stage::Set {
+            let why = "a state was restored or positions were set, which initialising would drop: step on from there, or \
+                       call cutis_sim_reset first";
+            return Err(argument(why));
+        }
+        let report = inner.sim.initialise().map_err(failed)?;
+        inner.stage = Stage::Running;
         inner.warning = report.warnings.join("\n");
         Ok(())
     };
@@ -694,8 +770,9 @@ pub unsafe extern "C" fn cutis_sim_initialise(sim: *mut CutisSim) -> CutisStatus
 
 /// Advances by `dt` seconds with the inputs as they stand now.
 ///
-/// CUTIS_ARGUMENT: `dt` is not positive and finite. CUTIS_STEP: the step failed. In both cases the simulation stands at
-/// its last accepted step.
+/// CUTIS_ARGUMENT: `dt` is not positive and finite. CUTIS_STEP: the step failed, or would have taken more linear solves than
+/// solver.mostSolves. CUTIS_CANCELLED: cutis_sim_cancel was called meanwhile. In all cases the simulation stands at its last
+/// accepted step.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle.
@@ -705,7 +782,8 @@ pub unsafe extern "C" fn cutis_sim_step(sim: *mut CutisSim, dt: f64) -> CutisSta
         if !(dt.is_finite() && dt > 0.0) {
             return Err(argument(format!("step size {dt} is not positive and finite")));
         }
-        let report = inner.sim.step(dt).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))?;
+        let report = inner.sim.step(dt).map_err(failed)?;
+        inner.stage = Stage::Running;
         inner.warning = report.warnings.join("\n");
         Ok(())
     };
@@ -717,7 +795,7 @@ pub unsafe extern "C" fn cutis_sim_step(sim: *mut CutisSim, dt: f64) -> CutisSta
 /// `t` is the time already.
 ///
 /// CUTIS_ARGUMENT: `t` lies before the time or is not finite, `dt` is not positive and finite, or it would take more than a
-/// million steps. CUTIS_STEP: a step failed; the simulation then stands at its last accepted step, and cutis_sim_time tells
+/// million steps. CUTIS_STEP, CUTIS_CANCELLED: as for cutis_sim_step; the simulation then stands at its last accepted step, and cutis_sim_time tells
 /// how far it came.
 ///
 /// # Safety
@@ -740,7 +818,8 @@ pub unsafe extern "C" fn cutis_sim_run_until(sim: *mut CutisSim, t: f64, dt: f64
         let mut warnings = Vec::new();
         for to_go in (1..=steps as u32).rev() {
             let step = (t - inner.sim.time()) / f64::from(to_go);
-            let report = inner.sim.step(step).map_err(|why| Failure(CutisStatus::CUTIS_STEP, chain(&why)))?;
+            let report = inner.sim.step(step).map_err(failed)?;
+            inner.stage = Stage::Running;
             warnings.extend(report.warnings);
             inner.warning = warnings.join("\n");
         }
@@ -750,16 +829,113 @@ pub unsafe extern "C" fn cutis_sim_run_until(sim: *mut CutisSim, t: f64, dt: f64
     unsafe { with(sim, body) }
 }
 
+/// Ends the cutis_sim_initialise, cutis_sim_step or cutis_sim_run_until that is under way on another thread before its next linear
+/// solve: that call then answers CUTIS_CANCELLED, and the simulation stands at its last accepted step. Nothing where no call is
+/// under way. The one function that may be called while another thread is inside the handle.
+///
+/// # Safety
+/// `sim` is NULL or a live handle that is not freed meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_cancel(sim: *mut CutisSim) -> CutisStatus {
+    // SAFETY: behind a CutisSim pointer is a handle; the rest is the caller's promise.
+    match unsafe { guard::cancel(sim.cast::<Handle<Inner>>()) } {
+        Ok(_) => CutisStatus::CUTIS_OK,
+        Err(_) => CutisStatus::CUTIS_NULL,
+    }
+}
+
+/// Number of nodes of the solver's mesh; 0 for NULL, busy and failed handles. The skin is part of them, or rides on them.
+///
+/// # Safety
+/// `sim` is NULL or a live handle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_node_count(sim: *const CutisSim) -> usize {
+    let mut n = 0;
+    let body = |inner: &mut Inner| {
+        n = inner.sim.model().mesh().nodes.len();
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    let _ = unsafe { with(sim.cast_mut(), body) };
+    n
+}
+
+/// Copies the current positions of all nodes, m: three numbers a node.
+///
+/// CUTIS_ARGUMENT: `len` is not three times cutis_node_count; `positions` is untouched then.
+///
+/// # Safety
+/// `sim` is NULL or a live handle; `positions` is NULL or holds `len` numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_nodes(sim: *const CutisSim, positions: *mut f64, len: usize) -> CutisStatus {
+    let body = |inner: &mut Inner| {
+        // SAFETY: the caller's promise.
+        let out = unsafe { pointer::slice_mut(positions, len, "positions")? };
+        let x = inner.sim.positions();
+        if out.len() != 3 * x.len() {
+            return Err(argument(format!("{} nodes have {} coordinates, not {len}", x.len(), 3 * x.len())));
+        }
+        out.chunks_exact_mut(3).zip(x).for_each(|(out, x)| out.copy_from_slice(x.as_slice()));
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { with(sim.cast_mut(), body) }
+}
+
+/// Puts the nodes that no bone holds at `positions` (m, three numbers for each node of cutis_sim_nodes): the next step seeks the
+/// equilibrium from there. Nodes of bones, time, velocities and outputs stay as they are until then.
+///
+/// CUTIS_ARGUMENT: `len` is not three times cutis_node_count, or a position is not finite; nothing has changed then.
+///
+/// # Safety
+/// `sim` is NULL or a live handle; `positions` is NULL or holds `len` numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_start_from(sim: *mut CutisSim, positions: *const f64, len: usize) -> CutisStatus {
+    let body = |inner: &mut Inner| {
+        // SAFETY: the caller's promise.
+        let positions = unsafe { pointer::slice(positions, len, "positions")? };
+        let wanted = 3 * inner.sim.model().mesh().nodes.len();
+        if len != wanted {
+            return Err(argument(format!("{} nodes have {wanted} coordinates, not {len}", wanted / 3)));
+        }
+        let x: Vec<Vec3> = positions.chunks_exact(3).map(Vec3::from_column_slice).collect();
+        inner.sim.start_from(&x).map_err(|why| match why {
+            SimError::StartLength { .. } | SimError::StartNotFinite { .. } => argument(chain(&why)),
+            _ => failed(why),
+        })?;
+        inner.stage = Stage::Set;
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { with(sim, body) }
+}
+
+/// Bytes of matrices, factor and solver of a simulation, its model and state left out; 0 for NULL, busy and failed handles.
+///
+/// # Safety
+/// `sim` is NULL or a live handle.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn cutis_sim_memory(sim: *const CutisSim) -> usize {
+    let mut bytes = 0;
+    let body = |inner: &mut Inner| {
+        bytes = inner.sim.memory();
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    let _ = unsafe { with(sim.cast_mut(), body) };
+    bytes
+}
+
 /// Change of `unknowns` with `knowns` along `seed`: the Jacobian of the last accepted equilibrium times a vector; in scenes with
 /// inertia or memory that of the last step (of its last piece, where it was cut), the state before it held.
 ///
-/// `unknowns` are ports that depend on the equilibrium (skin.position, skin.velocity, marker.position, bone.reactionForce,
-/// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
+/// `unknowns` are Float64 outputs (of skin, markers, bones, contacts and energies; not those of solver and quality) or inputs,
+/// `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
 /// row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
 ///
-/// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `knowns` and `unknowns`. CUTIS_STEP:
-/// there is no equilibrium yet, or in scenes with inertia or memory no step of this handle led to the state (it was restored).
-/// `sensitivity` is then of no use.
+/// CUTIS_ARGUMENT: no such ports, the seed is not finite, or `seed_len` or `sensitivity_len` are not the values of `knowns` and `unknowns`. CUTIS_STEP:
+/// there is no equilibrium yet, or in scenes with inertia or memory positions were set since the last step. `sensitivity` is then of
+/// no use.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
@@ -793,13 +969,13 @@ pub unsafe extern "C" fn cutis_sim_directional_derivative(
 
 /// Gradient of the `unknowns` weighted by `seed` by all `knowns` at once: the transposed Jacobian times a vector.
 ///
-/// `unknowns` are ports that depend on the equilibrium (skin.position, skin.velocity, marker.position, bone.reactionForce,
-/// bone.reactionTorque) or inputs, `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
+/// `unknowns` are Float64 outputs (of skin, markers, bones, contacts and energies; not those of solver and quality) or inputs,
+/// `knowns` are inputs and parameters; arrays hold the values of their ports one after another,
 /// row-major, in SI units. The simulation does not change; one linear solve, and a factorisation where the state is new.
 ///
-/// CUTIS_ARGUMENT: no such ports, or `seed_len` or `sensitivity_len` are not the values of `unknowns` and `knowns`. CUTIS_STEP:
-/// there is no equilibrium yet, or in scenes with inertia or memory no step of this handle led to the state (it was restored).
-/// `sensitivity` is then of no use.
+/// CUTIS_ARGUMENT: no such ports, the seed is not finite, or `seed_len` or `sensitivity_len` are not the values of `unknowns` and `knowns`. CUTIS_STEP:
+/// there is no equilibrium yet, or in scenes with inertia or memory positions were set since the last step. `sensitivity` is then of
+/// no use.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle; each pointer is NULL or holds as many elements as the length after it says.
@@ -833,8 +1009,18 @@ pub unsafe extern "C" fn cutis_sim_adjoint_derivative(
 
 /// A derivative that the scene or the moment does not have is no slip of the caller.
 fn no_derivative(why: SimError) -> Failure {
-    let status = match why {
-        SimError::Port { .. } | SimError::Range { .. } => CutisStatus::CUTIS_ARGUMENT,
+    match why {
+        SimError::Port { .. } | SimError::Range { .. } | SimError::SeedNotFinite(_) => argument(chain(&why)),
+        _ => failed(why),
+    }
+}
+
+/// A step, an equilibrium or a derivative that was not found, or is wanted no more.
+fn failed(why: SimError) -> Failure {
+    let status = match &why {
+        SimError::Solve { source: SolveError::Cancelled, .. } | SimError::Setup(SolveError::Cancelled) => {
+            CutisStatus::CUTIS_CANCELLED
+        }
         _ => CutisStatus::CUTIS_STEP,
     };
     Failure(status, chain(&why))
@@ -864,6 +1050,7 @@ pub unsafe extern "C" fn cutis_sim_time(sim: *const CutisSim) -> f64 {
 pub unsafe extern "C" fn cutis_sim_reset(sim: *mut CutisSim) -> CutisStatus {
     let body = |inner: &mut Inner| {
         inner.sim.reset();
+        inner.stage = Stage::New;
         Ok(())
     };
     // SAFETY: the caller's promise.
@@ -903,9 +1090,21 @@ unsafe fn state_at<'a>(state: *const CutisState) -> Result<&'a Saved, Failure> {
     }
 }
 
-/// Goes back to a saved state: from then on every step has the same bits as after the save.
+/// The same, if it is one of this simulation's model.
 ///
-/// CUTIS_STATE: it belongs to another scene.
+/// # Safety
+/// As for [`state_at`].
+unsafe fn own_state<'a>(inner: &Inner, state: *const CutisState) -> Result<&'a State, Failure> {
+    // SAFETY: the caller's promise.
+    let state = unsafe { &state_at(state)?.state };
+    state.belongs_to(inner.sim.model()).map_err(|why| Failure(CutisStatus::CUTIS_STATE, chain(&why)))?;
+    Ok(state)
+}
+
+/// Goes back to a saved state: from then on every step has the same bits as after the save. A simulation that is new goes on from
+/// there, too: it is not to be initialised then.
+///
+/// CUTIS_STATE: it belongs to another scene, be it one of the same mesh with another material; nothing was changed.
 ///
 /// # Safety
 /// `sim` is NULL or a live handle; `state` is NULL or a live state.
@@ -914,7 +1113,9 @@ pub unsafe extern "C" fn cutis_sim_restore(sim: *mut CutisSim, state: *const Cut
     let body = |inner: &mut Inner| {
         // SAFETY: the caller's promise.
         let state = unsafe { state_at(state)? };
-        inner.sim.restore(&state.state).map_err(|why| Failure(CutisStatus::CUTIS_STATE, chain(&why)))
+        inner.sim.restore(&state.state).map_err(|why| Failure(CutisStatus::CUTIS_STATE, chain(&why)))?;
+        inner.stage = if inner.sim.is_settled() { Stage::Set } else { Stage::New };
+        Ok(())
     };
     // SAFETY: the caller's promise.
     unsafe { with(sim, body) }
@@ -935,16 +1136,16 @@ pub unsafe extern "C" fn cutis_state_free(state: *mut CutisState) {
     }
 }
 
-/// Bytes that cutis_state_serialize needs for `state`; 0 on failure.
+/// Bytes that cutis_state_serialize needs for `state`; 0 on failure, and for a state of another scene.
 ///
 /// # Safety
-/// `sim` is NULL or a live handle of the state's scene; `state` is NULL or a live state.
+/// `sim` is NULL or a live handle; `state` is NULL or a live state.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cutis_state_size(sim: *const CutisSim, state: *const CutisState) -> usize {
     let mut size = 0;
     let body = |inner: &mut Inner| {
         // SAFETY: the caller's promise.
-        size = unsafe { state_at(state)? }.state.to_bytes(inner.sim.model()).len();
+        size = unsafe { own_state(inner, state)? }.to_bytes(inner.sim.model()).len();
         Ok(())
     };
     // SAFETY: the caller's promise.
@@ -954,10 +1155,10 @@ pub unsafe extern "C" fn cutis_state_size(sim: *const CutisSim, state: *const Cu
 
 /// Writes `state` as bytes that another process can read: little-endian, with format number, scene and checksum.
 ///
-/// CUTIS_ARGUMENT: `len` is less than cutis_state_size.
+/// CUTIS_ARGUMENT: `len` is less than cutis_state_size. CUTIS_STATE: it belongs to another scene.
 ///
 /// # Safety
-/// `sim` is NULL or a live handle of the state's scene; `state` is NULL or a live state; `bytes` is NULL or holds `len`
+/// `sim` is NULL or a live handle; `state` is NULL or a live state; `bytes` is NULL or holds `len`
 /// bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cutis_state_serialize(
@@ -968,7 +1169,7 @@ pub unsafe extern "C" fn cutis_state_serialize(
 ) -> CutisStatus {
     let body = |inner: &mut Inner| {
         // SAFETY: the caller's promise.
-        let written = unsafe { state_at(state)? }.state.to_bytes(inner.sim.model());
+        let written = unsafe { own_state(inner, state)? }.to_bytes(inner.sim.model());
         // SAFETY: the caller's promise.
         let out = unsafe { pointer::slice_mut(bytes, len, "bytes")? };
         let out = out

@@ -7,14 +7,15 @@
 
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 
+use super::fmi3::OnUnwinding;
 use super::guard::{self, Handle};
-use super::instance::{Answer, Instance, Instance2, Refusal, error};
-use super::logger::{Callback, Category, LogMessage2, Logger, Status, truth};
+use super::instance::{Answer, Instance, Instance2, Refusal, answered, discard, error};
+use super::logger::{Callback, Category, LogMessage2, Logger, Status, Told, truth};
 use super::modes::{self, Call, fmi2 as table};
 use super::pointer::{place, slice, slice_mut, text};
 use super::resources;
 use super::snapshot::Snapshot;
-use crate::fmu;
+use crate::fmu::{self, FmiVersion};
 use crate::port::Type;
 
 /// `fmi2Component`.
@@ -46,8 +47,7 @@ pub struct fmi2CallbackFunctions {
 /// `c` is null or came from `fmi2Instantiate` and was not freed.
 unsafe fn on(c: fmi2Component, call: Call, body: impl FnOnce(&mut Instance) -> Answer) -> Status {
     // SAFETY: the caller's promise.
-    unsafe { guard::with(c.cast::<Handle<Instance2>>(), |i| i.common.answer(call, modes::ERROR, body)) }
-        .unwrap_or(Status::Error)
+    unsafe { answered(c.cast::<Handle<Instance2>>(), |i| i.common.answer(call, modes::ERROR, body)) }
 }
 
 /// Functions that the component does not offer: Error and a line in the log.
@@ -55,7 +55,7 @@ macro_rules! not_offered {
     ($($name:ident($($argument:ident: $type:ty),*): $why:literal;)*) => {$(
         #[doc = concat!("`", stringify!($name), "`: ", $why, ".")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(c: fmi2Component $(, $argument: $type)*) -> Status {
+        pub unsafe extern "C-unwind" fn $name(c: fmi2Component $(, $argument: $type)*) -> Status {
             $(let _ = $argument;)*
             // SAFETY: the host's promise about its instance.
             unsafe { on(c, modes::not_offered(stringify!($name)), |_| Err(error($why))) }
@@ -67,19 +67,19 @@ macro_rules! not_offered {
 
 /// `fmi2GetTypesPlatform`: "default".
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+pub extern "C-unwind" fn fmi2GetTypesPlatform() -> *const c_char {
     c"default".as_ptr()
 }
 
 /// `fmi2GetVersion`: "2.0".
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetVersion() -> *const c_char {
+pub extern "C-unwind" fn fmi2GetVersion() -> *const c_char {
     c"2.0".as_ptr()
 }
 
 /// `fmi2SetDebugLogging`: no categories means all.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetDebugLogging(
+pub unsafe extern "C-unwind" fn fmi2SetDebugLogging(
     c: fmi2Component,
     loggingOn: fmi2Boolean,
     nCategories: usize,
@@ -100,7 +100,7 @@ pub unsafe extern "C" fn fmi2SetDebugLogging(
 
 /// `fmi2Instantiate`: null and a line in the log if name, type, GUID or scene are not as they should be.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Instantiate(
+pub unsafe extern "C-unwind" fn fmi2Instantiate(
     instanceName: *const c_char,
     fmuType: c_int,
     fmuGUID: *const c_char,
@@ -116,15 +116,15 @@ pub unsafe extern "C" fn fmi2Instantiate(
         let functions = unsafe { slice(functions, 1, "functions") }.ok()?.first()?;
         // SAFETY: the host passes a string, or null.
         let name = unsafe { text(instanceName) }.unwrap_or("");
-        let instance_name = CString::new(name).expect("a C string holds no zero byte");
+        let instance_name = CString::new(name).expect("a C string holds no zero byte").into();
         let callback = functions.logger.map_or(Callback::None, |logger| Callback::V2 { logger, instance_name });
         Some(Logger::new(callback, functions.componentEnvironment, truth(loggingOn)))
     };
     let opened = guard::caught(|| {
-        let Some(logger) = logger() else { return std::ptr::null_mut() };
+        let Some(logger) = logger() else { return (std::ptr::null_mut(), Told::nothing()) };
         let fail = |logger: Logger, why: &str| {
             logger.log(Status::Error, Category::Error, &format!("fmi2Instantiate: {why}"));
-            std::ptr::null_mut()
+            (std::ptr::null_mut(), logger.take())
         };
         // SAFETY: the host passes strings, or null.
         let (name, guid, location) = unsafe { (text(instanceName), text(fmuGUID), text(fmuResourceLocation)) };
@@ -142,25 +142,32 @@ pub unsafe extern "C" fn fmi2Instantiate(
             Ok(folder) => folder,
             Err(why) => return fail(logger, &why),
         };
-        match Instance::open(guid, folder.as_deref(), logger) {
-            Ok(common) => Handle::leak(Instance2 { common, last_step: Status::Ok }).cast(),
+        match Instance::open(guid, &[FmiVersion::V2, FmiVersion::V2Full], folder.as_deref(), logger) {
+            Ok(common) => {
+                let told = common.logger.take();
+                (Handle::leak(Instance2 { common, last_step: Status::Ok }).cast(), told)
+            }
             Err((logger, why)) => fail(logger, &why),
         }
     });
-    opened.unwrap_or_else(|why| {
+    let (instance, told): (fmi2Component, Told) = opened.unwrap_or_else(|why| {
         let told = guard::caught(|| {
-            if let Some(logger) = logger() {
-                logger.log(Status::Error, Category::Error, &format!("fmi2Instantiate: internal failure: {why}"));
-            }
+            let logger = logger()?;
+            logger.log(Status::Error, Category::Error, &format!("fmi2Instantiate: internal failure: {why}"));
+            Some(logger.take())
         });
-        let _ = told;
-        std::ptr::null_mut()
-    })
+        (std::ptr::null_mut(), told.ok().flatten().unwrap_or_else(Told::nothing))
+    });
+    // SAFETY: nobody else knows of the instance yet; it goes if the host's logger throws.
+    let unwanted = OnUnwinding(|| unsafe { fmi2FreeInstance(instance) });
+    told.tell();
+    std::mem::forget(unwanted);
+    instance
 }
 
 /// `fmi2FreeInstance`: saved states go with it.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeInstance(c: fmi2Component) {
+pub unsafe extern "C-unwind" fn fmi2FreeInstance(c: fmi2Component) {
     // SAFETY: the host's promise about its instance.
     unsafe { Handle::free(c.cast::<Handle<Instance2>>()) }
 }
@@ -169,7 +176,7 @@ pub unsafe extern "C" fn fmi2FreeInstance(c: fmi2Component) {
 
 /// `fmi2SetupExperiment`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetupExperiment(
+pub unsafe extern "C-unwind" fn fmi2SetupExperiment(
     c: fmi2Component,
     toleranceDefined: fmi2Boolean,
     tolerance: f64,
@@ -190,7 +197,7 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
 
 /// `fmi2EnterInitializationMode`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2EnterInitializationMode(c: fmi2Component) -> Status {
+pub unsafe extern "C-unwind" fn fmi2EnterInitializationMode(c: fmi2Component) -> Status {
     let body = |i: &mut Instance| {
         if i.start.is_none() {
             return Err(error("fmi2SetupExperiment was not called"));
@@ -203,21 +210,21 @@ pub unsafe extern "C" fn fmi2EnterInitializationMode(c: fmi2Component) -> Status
 
 /// `fmi2ExitInitializationMode`: equilibrium at the start values.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2ExitInitializationMode(c: fmi2Component) -> Status {
+pub unsafe extern "C-unwind" fn fmi2ExitInitializationMode(c: fmi2Component) -> Status {
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::EXIT_INITIALIZATION_MODE, Instance::exit_initialization) }
 }
 
 /// `fmi2Terminate`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Terminate(c: fmi2Component) -> Status {
+pub unsafe extern "C-unwind" fn fmi2Terminate(c: fmi2Component) -> Status {
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::TERMINATE, Instance::terminate) }
 }
 
 /// `fmi2Reset`: as after instantiation, also after an error.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Reset(c: fmi2Component) -> Status {
+pub unsafe extern "C-unwind" fn fmi2Reset(c: fmi2Component) -> Status {
     let body = |i: &mut Instance2| {
         i.last_step = Status::Ok;
         if i.common.is_poisoned() {
@@ -227,7 +234,7 @@ pub unsafe extern "C" fn fmi2Reset(c: fmi2Component) -> Status {
         }
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { guard::with(c.cast::<Handle<Instance2>>(), body) }.unwrap_or(Status::Error)
+    unsafe { answered(c.cast::<Handle<Instance2>>(), body) }
 }
 
 // ---------------------------------------------------------------- values
@@ -239,7 +246,7 @@ fn run(instance: &Instance, references: &[c_uint], k: usize, ty: Type) -> Result
     let (index, port) = instance
         .port(reference, ty)
         .map_err(|why| if why.message.starts_with("no variable") { unknown() } else { why })?;
-    if offset >= port.len() || !fmu::fits_fmi2(port) {
+    if offset >= port.len() || !instance.version.has(port) {
         return Err(unknown());
     }
     let longest = (port.len() - offset).min(references.len() - k);
@@ -265,7 +272,12 @@ fn each_run(
 
 /// `fmi2GetReal`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetReal(c: fmi2Component, vr: *const c_uint, nvr: usize, value: *mut f64) -> Status {
+pub unsafe extern "C-unwind" fn fmi2GetReal(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    value: *mut f64,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of this length, or null.
         let (references, out) = unsafe { (slice(vr, nvr, "vr")?, slice_mut(value, nvr, "value")?) };
@@ -281,7 +293,12 @@ pub unsafe extern "C" fn fmi2GetReal(c: fmi2Component, vr: *const c_uint, nvr: u
 
 /// `fmi2GetInteger`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetInteger(c: fmi2Component, vr: *const c_uint, nvr: usize, value: *mut c_int) -> Status {
+pub unsafe extern "C-unwind" fn fmi2GetInteger(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    value: *mut c_int,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of this length, or null.
         let (references, out) = unsafe { (slice(vr, nvr, "vr")?, slice_mut(value, nvr, "value")?) };
@@ -297,7 +314,7 @@ pub unsafe extern "C" fn fmi2GetInteger(c: fmi2Component, vr: *const c_uint, nvr
 
 /// `fmi2GetBoolean`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBoolean(
+pub unsafe extern "C-unwind" fn fmi2GetBoolean(
     c: fmi2Component,
     vr: *const c_uint,
     nvr: usize,
@@ -321,7 +338,7 @@ pub unsafe extern "C" fn fmi2GetBoolean(
 
 /// `fmi2GetString`: no variable is a string.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetString(
+pub unsafe extern "C-unwind" fn fmi2GetString(
     c: fmi2Component,
     vr: *const c_uint,
     nvr: usize,
@@ -334,35 +351,43 @@ pub unsafe extern "C" fn fmi2GetString(
 
 /// `fmi2SetReal`: checked as a whole, then written as a whole; nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetReal(c: fmi2Component, vr: *const c_uint, nvr: usize, value: *const f64) -> Status {
+pub unsafe extern "C-unwind" fn fmi2SetReal(
+    c: fmi2Component,
+    vr: *const c_uint,
+    nvr: usize,
+    value: *const f64,
+) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes arrays of this length, or null.
         let (references, values) = unsafe { (slice(vr, nvr, "vr")?, slice(value, nvr, "value")?) };
-        each_run(i, references, Type::Float64, |i, port, offset, range| {
-            i.check_set(&i.sim.model().ports()[port], offset, &values[range])
-        })?;
+        each_run(i, references, Type::Float64, |i, port, offset, range| i.check_set(port, offset, &values[range]))?;
         each_run(i, references, Type::Float64, |i, port, offset, range| i.set(port, offset, &values[range]))
     };
     // SAFETY: the host's promise about its instance.
     unsafe { on(c, table::set("fmi2SetReal"), body) }
 }
 
-/// `fmi2SetInteger`: no integer can be set.
+/// `fmi2SetInteger`: checked as a whole, then written as a whole; nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetInteger(
+pub unsafe extern "C-unwind" fn fmi2SetInteger(
     c: fmi2Component,
     vr: *const c_uint,
     nvr: usize,
     value: *const c_int,
 ) -> Status {
-    let _ = (vr, value);
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of this length, or null.
+        let (references, values) = unsafe { (slice(vr, nvr, "vr")?, slice(value, nvr, "value")?) };
+        each_run(i, references, Type::Int32, |i, port, offset, range| i.check_i32(port, offset, &values[range]))?;
+        each_run(i, references, Type::Int32, |i, port, offset, range| i.set_i32(port, offset, &values[range]))
+    };
     // SAFETY: the host's promise about its instance.
-    unsafe { on(c, table::set("fmi2SetInteger"), |_| none_of(nvr, "no integer can be set")) }
+    unsafe { on(c, table::set("fmi2SetInteger"), body) }
 }
 
 /// `fmi2SetBoolean`: no truth value can be set.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetBoolean(
+pub unsafe extern "C-unwind" fn fmi2SetBoolean(
     c: fmi2Component,
     vr: *const c_uint,
     nvr: usize,
@@ -375,7 +400,7 @@ pub unsafe extern "C" fn fmi2SetBoolean(
 
 /// `fmi2SetString`: no variable is a string.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetString(
+pub unsafe extern "C-unwind" fn fmi2SetString(
     c: fmi2Component,
     vr: *const c_uint,
     nvr: usize,
@@ -394,7 +419,7 @@ fn none_of(n: usize, why: &str) -> Answer {
 
 /// `fmi2GetFMUstate`: a new state where `*FMUstate` is null, else that one overwritten.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> Status {
+pub unsafe extern "C-unwind" fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes the place of a state, or null.
         let state = unsafe { place(FMUstate, "FMUstate")? };
@@ -407,14 +432,14 @@ pub unsafe extern "C" fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FM
 
 /// `fmi2SetFMUstate`: values, outputs, time and mode; the state itself stays as it is.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> Status {
+pub unsafe extern "C-unwind" fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> Status {
     // SAFETY: the host's promise about its instance. The state's address is compared, never followed.
     unsafe { on(c, table::SET_FMU_STATE, |i| i.restore(FMUstate.cast::<Snapshot>())) }
 }
 
 /// `fmi2FreeFMUstate`: `*FMUstate` becomes null; null is no error.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> Status {
+pub unsafe extern "C-unwind" fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> Status {
     let body = |i: &mut Instance| {
         if FMUstate.is_null() {
             return Ok(());
@@ -431,7 +456,7 @@ pub unsafe extern "C" fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2F
 
 /// `fmi2SerializedFMUstateSize`, bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
+pub unsafe extern "C-unwind" fn fmi2SerializedFMUstateSize(
     c: fmi2Component,
     FMUstate: fmi2FMUstate,
     size: *mut usize,
@@ -448,7 +473,7 @@ pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
 
 /// `fmi2SerializeFMUstate`: `size` bytes must hold the state.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializeFMUstate(
+pub unsafe extern "C-unwind" fn fmi2SerializeFMUstate(
     c: fmi2Component,
     FMUstate: fmi2FMUstate,
     serializedState: *mut u8,
@@ -471,7 +496,7 @@ pub unsafe extern "C" fn fmi2SerializeFMUstate(
 
 /// `fmi2DeSerializeFMUstate`: of this scene and library, from any process; legal right after instantiation.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
+pub unsafe extern "C-unwind" fn fmi2DeSerializeFMUstate(
     c: fmi2Component,
     serializedState: *const u8,
     size: usize,
@@ -492,7 +517,7 @@ pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
 
 /// `fmi2DoStep`: exactly to the end of the step, or Discard and no change at all.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DoStep(
+pub unsafe extern "C-unwind" fn fmi2DoStep(
     c: fmi2Component,
     currentCommunicationPoint: f64,
     communicationStepSize: f64,
@@ -510,7 +535,22 @@ pub unsafe extern "C" fn fmi2DoStep(
         status
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { guard::with(c.cast::<Handle<Instance2>>(), body) }.unwrap_or(Status::Error)
+    unsafe { answered(c.cast::<Handle<Instance2>>(), body) }
+}
+
+/// `fmi2CancelStep`: ends a step that is under way on another thread before its next linear solve; it is then discarded. Discard
+/// where none is.
+#[unsafe(no_mangle)]
+pub unsafe extern "C-unwind" fn fmi2CancelStep(c: fmi2Component) -> Status {
+    // SAFETY: the host's promise about its instance.
+    match unsafe { guard::cancel(c.cast::<Handle<Instance2>>()) } {
+        Ok(true) => Status::Ok,
+        Ok(false) => {
+            // SAFETY: the host's promise about its instance.
+            unsafe { on(c, modes::not_offered("fmi2CancelStep"), |_| Err(discard("no step is under way"))) }
+        }
+        Err(_) => Status::Error,
+    }
 }
 
 /// One of the status questions: Discard where there is nothing to tell, as the standard wants.
@@ -528,12 +568,12 @@ unsafe fn tell<T>(
         i.common.answer(table::status(name), modes::ERROR, |_| {
             // SAFETY: the caller's promise.
             let place = unsafe { place(value, "value")? };
-            *place = told.ok_or(Refusal { status: Status::Discard, message: "this is not known here".to_owned() })?;
+            *place = told.ok_or_else(|| discard("this is not known here"))?;
             Ok(())
         })
     };
     // SAFETY: the caller's promise.
-    unsafe { guard::with(c.cast::<Handle<Instance2>>(), body) }.unwrap_or(Status::Error)
+    unsafe { answered(c.cast::<Handle<Instance2>>(), body) }
 }
 
 /// `fmi2StatusKind`.
@@ -543,21 +583,21 @@ const TERMINATED: c_int = 3;
 
 /// `fmi2GetStatus`: of the last step.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetStatus(c: fmi2Component, s: c_int, value: *mut Status) -> Status {
+pub unsafe extern "C-unwind" fn fmi2GetStatus(c: fmi2Component, s: c_int, value: *mut Status) -> Status {
     // SAFETY: the host's promise about its instance and place.
     unsafe { tell(c, "fmi2GetStatus", value, |i| (s == DO_STEP_STATUS).then_some(i.last_step)) }
 }
 
 /// `fmi2GetRealStatus`: the last successful time.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetRealStatus(c: fmi2Component, s: c_int, value: *mut f64) -> Status {
+pub unsafe extern "C-unwind" fn fmi2GetRealStatus(c: fmi2Component, s: c_int, value: *mut f64) -> Status {
     // SAFETY: the host's promise about its instance and place.
     unsafe { tell(c, "fmi2GetRealStatus", value, |i| (s == LAST_SUCCESSFUL_TIME).then(|| i.common.sim.time())) }
 }
 
 /// `fmi2GetIntegerStatus`: nothing to tell.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetIntegerStatus(c: fmi2Component, s: c_int, value: *mut c_int) -> Status {
+pub unsafe extern "C-unwind" fn fmi2GetIntegerStatus(c: fmi2Component, s: c_int, value: *mut c_int) -> Status {
     let _ = s;
     // SAFETY: the host's promise about its instance and place.
     unsafe { tell(c, "fmi2GetIntegerStatus", value, |_| None) }
@@ -565,14 +605,14 @@ pub unsafe extern "C" fn fmi2GetIntegerStatus(c: fmi2Component, s: c_int, value:
 
 /// `fmi2GetBooleanStatus`: the component never asks to end.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBooleanStatus(c: fmi2Component, s: c_int, value: *mut fmi2Boolean) -> Status {
+pub unsafe extern "C-unwind" fn fmi2GetBooleanStatus(c: fmi2Component, s: c_int, value: *mut fmi2Boolean) -> Status {
     // SAFETY: the host's promise about its instance and place.
     unsafe { tell(c, "fmi2GetBooleanStatus", value, |_| (s == TERMINATED).then_some(0)) }
 }
 
 /// `fmi2GetStringStatus`: nothing is ever pending.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetStringStatus(c: fmi2Component, s: c_int, value: *mut *const c_char) -> Status {
+pub unsafe extern "C-unwind" fn fmi2GetStringStatus(c: fmi2Component, s: c_int, value: *mut *const c_char) -> Status {
     let _ = s;
     // SAFETY: the host's promise about its instance and place.
     unsafe { tell(c, "fmi2GetStringStatus", value, |_| None) }
@@ -582,7 +622,7 @@ pub unsafe extern "C" fn fmi2GetStringStatus(c: fmi2Component, s: c_int, value: 
 
 /// `fmi2GetDirectionalDerivative`: one solve with the stiffness of the accepted state.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
+pub unsafe extern "C-unwind" fn fmi2GetDirectionalDerivative(
     c: fmi2Component,
     vUnknown_ref: *const c_uint,
     nUnknown: usize,
@@ -618,9 +658,9 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
     unsafe { on(c, table::GET_DIRECTIONAL_DERIVATIVE, body) }
 }
 
-/// `fmi2GetRealOutputDerivatives`: velocities of skin and markers (order 1) in scenes with inertia.
+/// `fmi2GetRealOutputDerivatives`: velocities of markers, bones and skin, its acceleration (order 1) in scenes with inertia.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+pub unsafe extern "C-unwind" fn fmi2GetRealOutputDerivatives(
     c: fmi2Component,
     vr: *const c_uint,
     nvr: usize,
@@ -668,7 +708,6 @@ impl Whole {
 // ---------------------------------------------------------------- not offered
 
 not_offered! {
-    fmi2CancelStep(): "no step runs asynchronously";
     fmi2SetRealInputDerivatives(vr: *const c_uint, nvr: usize, order: *const c_int, value: *const f64): "inputs are not interpolated";
     fmi2EnterEventMode(): "this component offers co-simulation only";
     fmi2NewDiscreteStates(eventInfo: *mut c_void): "this component offers co-simulation only";

@@ -10,11 +10,12 @@ use std::ffi::{c_char, c_void};
 use std::path::Path;
 
 use super::guard::{self, Handle};
-use super::instance::{Answer, Inside, Instance, Instance3, Readable, Update, error};
-use super::logger::{Callback, Category, LogMessage3, Logger, Status};
+use super::instance::{Answer, Inside, Instance, Instance3, Readable, Update, answered, error};
+use super::logger::{Callback, Category, LogMessage3, Logger, Status, Told};
 use super::modes::{self, Call, fmi3 as table};
 use super::pointer::{place, slice, slice_mut, text};
 use super::snapshot::Snapshot;
+use crate::fmu::FmiVersion;
 use crate::port::Type;
 
 /// `fmi3Instance`.
@@ -30,13 +31,11 @@ pub type fmi3FMUState = *mut c_void;
 /// `instance` is null or came from an instantiate function here and was not freed.
 unsafe fn on(instance: fmi3Instance, call: Call, body: impl FnOnce(&mut Instance) -> Answer) -> Status {
     // SAFETY: the caller's promise.
-    let status =
-        unsafe { guard::with(instance.cast::<Handle<Instance3>>(), |i| i.common.answer(call, modes::ERROR, body)) };
-    status.unwrap_or(Status::Error)
+    unsafe { answered(instance.cast::<Handle<Instance3>>(), |i| i.common.answer(call, modes::ERROR, body)) }
 }
 
 /// `fmi3IntermediateUpdateCallback`.
-pub type IntermediateUpdate = unsafe extern "C" fn(
+pub type IntermediateUpdate = unsafe extern "C-unwind" fn(
     *mut c_void,
     f64,
     fmi3Boolean,
@@ -73,7 +72,7 @@ macro_rules! not_offered {
     ($($name:ident($($argument:ident: $type:ty),*): $why:literal;)*) => {$(
         #[doc = concat!("`", stringify!($name), "`: ", $why, ".")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(instance: fmi3Instance $(, $argument: $type)*) -> Status {
+        pub unsafe extern "C-unwind" fn $name(instance: fmi3Instance $(, $argument: $type)*) -> Status {
             $(let _ = $argument;)*
             // SAFETY: the host's promise about its instance.
             unsafe { on(instance, modes::not_offered(stringify!($name)), |_| Err(error($why))) }
@@ -86,14 +85,14 @@ macro_rules! no_variable_of_type {
     ($($get:ident $set:ident $type:ty;)*) => {$(
         #[doc = concat!("`", stringify!($get), "`: no variable has this type.")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $get(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *mut $type, nValues: usize) -> Status {
+        pub unsafe extern "C-unwind" fn $get(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *mut $type, nValues: usize) -> Status {
             let _ = (valueReferences, values);
             // SAFETY: the host's promise about its instance.
             unsafe { on(instance, table::get(stringify!($get)), |_| nothing_asked(nValueReferences, nValues)) }
         }
         #[doc = concat!("`", stringify!($set), "`: no variable has this type.")]
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $set(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *const $type, nValues: usize) -> Status {
+        pub unsafe extern "C-unwind" fn $set(instance: fmi3Instance, valueReferences: *const u32, nValueReferences: usize, values: *const $type, nValues: usize) -> Status {
             let _ = (valueReferences, values);
             // SAFETY: the host's promise about its instance.
             unsafe { on(instance, table::set(stringify!($set)), |_| nothing_asked(nValueReferences, nValues)) }
@@ -109,13 +108,13 @@ fn nothing_asked(n_references: usize, n_values: usize) -> Answer {
 
 /// `fmi3GetVersion`: "3.0".
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi3GetVersion() -> *const c_char {
+pub extern "C-unwind" fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
 }
 
 /// `fmi3SetDebugLogging`: no categories means all.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetDebugLogging(
+pub unsafe extern "C-unwind" fn fmi3SetDebugLogging(
     instance: fmi3Instance,
     loggingOn: fmi3Boolean,
     nCategories: usize,
@@ -136,7 +135,7 @@ pub unsafe extern "C" fn fmi3SetDebugLogging(
 
 /// `fmi3InstantiateModelExchange`: not offered, returns null.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3InstantiateModelExchange(
+pub unsafe extern "C-unwind" fn fmi3InstantiateModelExchange(
     instanceName: *const c_char,
     instantiationToken: *const c_char,
     resourcePath: *const c_char,
@@ -156,7 +155,7 @@ pub unsafe extern "C" fn fmi3InstantiateModelExchange(
 
 /// `fmi3InstantiateCoSimulation`: null and a line in the log if name, token or scene are not as they should be.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
+pub unsafe extern "C-unwind" fn fmi3InstantiateCoSimulation(
     instanceName: *const c_char,
     instantiationToken: *const c_char,
     resourcePath: *const c_char,
@@ -176,7 +175,7 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
         let logger = Logger::new(logMessage.map_or(Callback::None, Callback::V3), instanceEnvironment, loggingOn != 0);
         let fail = |logger: Logger, why: &str| {
             logger.log(Status::Error, Category::Error, &format!("fmi3InstantiateCoSimulation: {why}"));
-            std::ptr::null_mut()
+            (std::ptr::null_mut(), logger.take())
         };
         // SAFETY: the host passes strings, or null.
         let (name, token, folder) = unsafe { (text(instanceName), text(instantiationToken), text(resourcePath)) };
@@ -190,13 +189,21 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
         if eventModeUsed != 0 {
             return fail(logger, "eventModeUsed, but this component has no event mode");
         }
-        match Instance::open(token, folder.map(Path::new), logger) {
+        match Instance::open(token, &[FmiVersion::V3], folder.map(Path::new), logger) {
             Ok(common) => {
                 let update = intermediateUpdate.map(|callback| Update { callback, environment: instanceEnvironment });
-                Handle::leak(Instance3 { common, update }).cast()
+                let told = common.logger.take();
+                (Handle::leak(Instance3 { common, update }).cast(), told)
             }
             Err((logger, why)) => fail(logger, &why),
         }
+    });
+    let opened = opened.map(|(instance, told): (fmi3Instance, Told)| {
+        // SAFETY: nobody else knows of the instance yet; it goes if the host's logger throws.
+        let unwanted = OnUnwinding(|| unsafe { fmi3FreeInstance(instance) });
+        told.tell();
+        std::mem::forget(unwanted);
+        instance
     });
     opened.unwrap_or_else(|why| {
         refuse_instance(
@@ -210,7 +217,7 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
 
 /// `fmi3InstantiateScheduledExecution`: not offered, returns null.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
+pub unsafe extern "C-unwind" fn fmi3InstantiateScheduledExecution(
     instanceName: *const c_char,
     instantiationToken: *const c_char,
     resourcePath: *const c_char,
@@ -233,19 +240,26 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
 
 fn refuse_instance(log: Option<LogMessage3>, environment: *mut c_void, on: fmi3Boolean, why: &str) -> fmi3Instance {
     let told = guard::caught(|| {
-        Logger::new(log.map_or(Callback::None, Callback::V3), environment, on != 0).log(
-            Status::Error,
-            Category::Error,
-            why,
-        )
+        let logger = Logger::new(log.map_or(Callback::None, Callback::V3), environment, on != 0);
+        logger.log(Status::Error, Category::Error, why);
+        logger.take()
     });
-    let _ = told;
+    told.unwrap_or_else(|_| Told::nothing()).tell();
     std::ptr::null_mut()
+}
+
+/// Runs when it is dropped, which is while the host's exception passes through; forgotten otherwise.
+pub(super) struct OnUnwinding<F: FnMut()>(pub(super) F);
+
+impl<F: FnMut()> Drop for OnUnwinding<F> {
+    fn drop(&mut self) {
+        (self.0)();
+    }
 }
 
 /// `fmi3FreeInstance`: saved states go with it.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3FreeInstance(instance: fmi3Instance) {
+pub unsafe extern "C-unwind" fn fmi3FreeInstance(instance: fmi3Instance) {
     // SAFETY: the host's promise about its instance.
     unsafe { Handle::free(instance.cast::<Handle<Instance3>>()) }
 }
@@ -254,7 +268,7 @@ pub unsafe extern "C" fn fmi3FreeInstance(instance: fmi3Instance) {
 
 /// `fmi3EnterInitializationMode`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3EnterInitializationMode(
+pub unsafe extern "C-unwind" fn fmi3EnterInitializationMode(
     instance: fmi3Instance,
     toleranceDefined: fmi3Boolean,
     tolerance: f64,
@@ -276,7 +290,7 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
 
 /// `fmi3ExitInitializationMode`: equilibrium at the start values.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3ExitInitializationMode(instance: fmi3Instance) -> Status {
+pub unsafe extern "C-unwind" fn fmi3ExitInitializationMode(instance: fmi3Instance) -> Status {
     // SAFETY: the host's promise about its instance.
     unsafe { on(instance, table::EXIT_INITIALIZATION_MODE, Instance::exit_initialization) }
 }
@@ -287,14 +301,14 @@ not_offered! {
 
 /// `fmi3Terminate`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3Terminate(instance: fmi3Instance) -> Status {
+pub unsafe extern "C-unwind" fn fmi3Terminate(instance: fmi3Instance) -> Status {
     // SAFETY: the host's promise about its instance.
     unsafe { on(instance, table::TERMINATE, Instance::terminate) }
 }
 
 /// `fmi3Reset`: as after instantiation, also after an error.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3Reset(instance: fmi3Instance) -> Status {
+pub unsafe extern "C-unwind" fn fmi3Reset(instance: fmi3Instance) -> Status {
     let body = |i: &mut Instance3| {
         if i.common.is_poisoned() {
             reset_poisoned(&mut i.common)
@@ -303,7 +317,7 @@ pub unsafe extern "C" fn fmi3Reset(instance: fmi3Instance) -> Status {
         }
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { guard::with(instance.cast::<Handle<Instance3>>(), body) }.unwrap_or(Status::Error)
+    unsafe { answered(instance.cast::<Handle<Instance3>>(), body) }
 }
 
 /// Reset is the one call that a poisoned instance still obeys.
@@ -318,7 +332,7 @@ pub(super) fn reset_poisoned(instance: &mut Instance) -> Status {
 
 /// `fmi3GetFloat64`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFloat64(
+pub unsafe extern "C-unwind" fn fmi3GetFloat64(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
@@ -348,7 +362,7 @@ pub unsafe extern "C" fn fmi3GetFloat64(
 
 /// `fmi3GetFloat32`: a copy, rounded to single precision.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFloat32(
+pub unsafe extern "C-unwind" fn fmi3GetFloat32(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
@@ -382,7 +396,7 @@ pub unsafe extern "C" fn fmi3GetFloat32(
 
 /// `fmi3GetInt32`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetInt32(
+pub unsafe extern "C-unwind" fn fmi3GetInt32(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
@@ -411,7 +425,7 @@ pub unsafe extern "C" fn fmi3GetInt32(
 
 /// `fmi3GetBoolean`: a copy; between steps nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetBoolean(
+pub unsafe extern "C-unwind" fn fmi3GetBoolean(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
@@ -441,7 +455,7 @@ pub unsafe extern "C" fn fmi3GetBoolean(
 
 /// `fmi3SetFloat64`: checked as a whole, then written as a whole; nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFloat64(
+pub unsafe extern "C-unwind" fn fmi3SetFloat64(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
@@ -457,9 +471,9 @@ pub unsafe extern "C" fn fmi3SetFloat64(
         check_lengths(i, references, Type::Float64, values.len())?;
         let mut rest = values;
         for &reference in references {
-            let (_, port) = i.port(reference, Type::Float64)?;
-            let (now, later) = rest.split_at(port.len());
-            i.check_set(port, 0, now)?;
+            let (k, n) = i.port(reference, Type::Float64).map(|(k, p)| (k, p.len()))?;
+            let (now, later) = rest.split_at(n);
+            i.check_set(k, 0, now)?;
             rest = later;
         }
         let mut rest = values;
@@ -477,7 +491,7 @@ pub unsafe extern "C" fn fmi3SetFloat64(
 
 /// `fmi3SetFloat32`: checked as a whole, then written as a whole; nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFloat32(
+pub unsafe extern "C-unwind" fn fmi3SetFloat32(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
@@ -493,8 +507,8 @@ pub unsafe extern "C" fn fmi3SetFloat32(
         check_lengths(i, references, Type::Float64, values.len())?;
         let mut rest = values;
         for &reference in references {
-            let (_, port) = i.port(reference, Type::Float64)?;
-            let (now, later) = rest.split_at(port.len());
+            let (port, n) = i.port(reference, Type::Float64).map(|(k, p)| (k, p.len()))?;
+            let (now, later) = rest.split_at(n);
             now.iter().enumerate().try_for_each(|(k, v)| i.check_set(port, k, &[f64::from(*v)]))?;
             rest = later;
         }
@@ -511,23 +525,39 @@ pub unsafe extern "C" fn fmi3SetFloat32(
     unsafe { on(instance, table::set("fmi3SetFloat32"), body) }
 }
 
-/// `fmi3SetInt32`: no variable of this type can be set.
+/// `fmi3SetInt32`: checked as a whole, then written as a whole; nothing is computed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetInt32(
+pub unsafe extern "C-unwind" fn fmi3SetInt32(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
     values: *const i32,
     nValues: usize,
 ) -> Status {
-    let _ = (valueReferences, values);
+    let body = |i: &mut Instance| {
+        // SAFETY: the host passes arrays of these lengths, or null.
+        let (references, values) = unsafe {
+            (slice(valueReferences, nValueReferences, "valueReferences")?, slice(values, nValues, "values")?)
+        };
+        check_lengths(i, references, Type::Int32, values.len())?;
+        for pass in [Instance::check_i32, Instance::set_i32] {
+            let mut rest = values;
+            for &reference in references {
+                let (port, n) = i.port(reference, Type::Int32).map(|(k, p)| (k, p.len()))?;
+                let (now, later) = rest.split_at(n);
+                pass(i, port, 0, now)?;
+                rest = later;
+            }
+        }
+        Ok(())
+    };
     // SAFETY: the host's promise about its instance.
-    unsafe { on(instance, table::set("fmi3SetInt32"), |_| nothing_settable(nValueReferences, nValues)) }
+    unsafe { on(instance, table::set("fmi3SetInt32"), body) }
 }
 
 /// `fmi3SetBoolean`: no variable of this type can be set.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetBoolean(
+pub unsafe extern "C-unwind" fn fmi3SetBoolean(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
@@ -592,7 +622,7 @@ not_offered! {
 
 /// `fmi3GetFMUState`: a new state where `*FMUState` is null, else that one overwritten.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> Status {
+pub unsafe extern "C-unwind" fn fmi3GetFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> Status {
     let body = |i: &mut Instance| {
         // SAFETY: the host passes the place of a state, or null.
         let state = unsafe { place(FMUState, "FMUState")? };
@@ -605,14 +635,14 @@ pub unsafe extern "C" fn fmi3GetFMUState(instance: fmi3Instance, FMUState: *mut 
 
 /// `fmi3SetFMUState`: values, outputs, time and mode; the state itself stays as it is.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFMUState(instance: fmi3Instance, FMUState: fmi3FMUState) -> Status {
+pub unsafe extern "C-unwind" fn fmi3SetFMUState(instance: fmi3Instance, FMUState: fmi3FMUState) -> Status {
     // SAFETY: the host's promise about its instance. The state's address is compared, never followed.
     unsafe { on(instance, table::SET_FMU_STATE, |i| i.restore(FMUState.cast::<Snapshot>())) }
 }
 
 /// `fmi3FreeFMUState`: `*FMUState` becomes null; null is no error.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3FreeFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> Status {
+pub unsafe extern "C-unwind" fn fmi3FreeFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> Status {
     let body = |i: &mut Instance| {
         if FMUState.is_null() {
             return Ok(());
@@ -629,7 +659,7 @@ pub unsafe extern "C" fn fmi3FreeFMUState(instance: fmi3Instance, FMUState: *mut
 
 /// `fmi3SerializedFMUStateSize`, bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializedFMUStateSize(
+pub unsafe extern "C-unwind" fn fmi3SerializedFMUStateSize(
     instance: fmi3Instance,
     FMUState: fmi3FMUState,
     size: *mut usize,
@@ -646,7 +676,7 @@ pub unsafe extern "C" fn fmi3SerializedFMUStateSize(
 
 /// `fmi3SerializeFMUState`: `size` bytes must hold the state.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializeFMUState(
+pub unsafe extern "C-unwind" fn fmi3SerializeFMUState(
     instance: fmi3Instance,
     FMUState: fmi3FMUState,
     serializedState: *mut u8,
@@ -669,7 +699,7 @@ pub unsafe extern "C" fn fmi3SerializeFMUState(
 
 /// `fmi3DeserializeFMUState`: of this scene and library, from any process; legal right after instantiation.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3DeserializeFMUState(
+pub unsafe extern "C-unwind" fn fmi3DeserializeFMUState(
     instance: fmi3Instance,
     serializedState: *const u8,
     size: usize,
@@ -688,9 +718,10 @@ pub unsafe extern "C" fn fmi3DeserializeFMUState(
 
 // ---------------------------------------------------------------- derivatives, configuration, clocks, model exchange
 
-/// `fmi3GetOutputDerivatives`: velocities of skin and markers (order 1) in scenes with inertia; one order a variable.
+/// `fmi3GetOutputDerivatives`: velocities of skin, markers and bones, acceleration of the skin (order 1) in scenes with inertia;
+/// one order a variable.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetOutputDerivatives(
+pub unsafe extern "C-unwind" fn fmi3GetOutputDerivatives(
     instance: fmi3Instance,
     valueReferences: *const u32,
     nValueReferences: usize,
@@ -724,7 +755,7 @@ pub unsafe extern "C" fn fmi3GetOutputDerivatives(
 
 /// `fmi3GetDirectionalDerivative`: one solve with the stiffness of the accepted state.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
+pub unsafe extern "C-unwind" fn fmi3GetDirectionalDerivative(
     instance: fmi3Instance,
     unknowns: *const u32,
     nUnknowns: usize,
@@ -755,7 +786,7 @@ pub unsafe extern "C" fn fmi3GetDirectionalDerivative(
 
 /// `fmi3GetAdjointDerivative`: one solve with the transposed stiffness of the accepted state.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetAdjointDerivative(
+pub unsafe extern "C-unwind" fn fmi3GetAdjointDerivative(
     instance: fmi3Instance,
     unknowns: *const u32,
     nUnknowns: usize,
@@ -815,7 +846,7 @@ not_offered! {
 
 /// `fmi3DoStep`: exactly to the end of the step, or Discard and no change at all.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3DoStep(
+pub unsafe extern "C-unwind" fn fmi3DoStep(
     instance: fmi3Instance,
     currentCommunicationPoint: f64,
     communicationStepSize: f64,
@@ -860,7 +891,7 @@ pub unsafe extern "C" fn fmi3DoStep(
         status
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { guard::with(instance.cast::<Handle<Instance3>>(), body) }.unwrap_or(Status::Error)
+    unsafe { answered(instance.cast::<Handle<Instance3>>(), body) }
 }
 
 impl Update {

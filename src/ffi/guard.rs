@@ -1,14 +1,17 @@
 //! No panic leaves the library, and no handle is used twice at once.
 //!
 //! Every exported function that owns a handle runs inside [`with`]: it refuses null, foreign and busy handles, catches
-//! a panic and poisons the handle with its message.
+//! a panic and poisons the handle with its message. It computes in the default floating-point environment, whatever the host's.
 
 use std::any::Any;
 use std::cell::UnsafeCell;
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Once;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
+use std::sync::{Arc, Once};
+
+use super::floats;
+use crate::sim::Allowance;
 
 /// Guarded calls under way. While there is one, the panic hook keeps quiet: its message goes into a handle instead.
 static UNDER_WAY: AtomicUsize = AtomicUsize::new(0);
@@ -17,6 +20,8 @@ static UNDER_WAY: AtomicUsize = AtomicUsize::new(0);
 pub(super) trait Guarded {
     /// First word of every handle of this kind; tells an instance from a state, and FMI 2.0 from FMI 3.0.
     const TAG: u64;
+    /// What its steps live on, for whoever may cancel them.
+    fn allowance(&self) -> Arc<Allowance>;
     /// Called once after a panic: from now on only free, reset and message may answer.
     fn poison(&mut self, why: String);
 }
@@ -30,6 +35,7 @@ pub struct Handle<T> {
     /// What the host's own callback may look at while a call is under way, and the thread that it runs on.
     offered: AtomicPtr<c_void>,
     thread: AtomicUsize,
+    allowance: Arc<Allowance>,
     value: UnsafeCell<T>,
 }
 
@@ -54,6 +60,7 @@ impl<T: Guarded> Handle<T> {
             busy: AtomicBool::new(false),
             offered: AtomicPtr::new(std::ptr::null_mut()),
             thread: AtomicUsize::new(0),
+            allowance: value.allowance(),
             value: UnsafeCell::new(value),
         }))
     }
@@ -93,6 +100,8 @@ unsafe fn enter<'a, T: Guarded>(handle: *mut Handle<T>) -> Result<&'a Handle<T>,
     if this.busy.swap(true, Ordering::Acquire) {
         return Err(Denied::Busy);
     }
+    // What was cancelled was another call.
+    this.allowance.uncancel();
     Ok(this)
 }
 
@@ -115,6 +124,28 @@ pub(super) unsafe fn with<T: Guarded, R>(handle: *mut Handle<T>, body: impl FnOn
     outcome
 }
 
+/// Ends the call that is under way in a handle before its next linear solve; nothing where there is none. From any thread.
+/// Returns whether there was one.
+///
+/// # Safety
+/// As for [`with`].
+pub(super) unsafe fn cancel<T: Guarded>(handle: *mut Handle<T>) -> Result<bool, Denied> {
+    if handle.is_null() {
+        return Err(Denied::Null);
+    }
+    // SAFETY: the caller's promise, as in `enter`: nothing beyond the tag is touched before the tag is known to be ours.
+    if !handle.is_aligned() || unsafe { (&raw const (*handle).tag).read() } != T::TAG {
+        return Err(Denied::Foreign);
+    }
+    // SAFETY: the tag says that `Handle::leak` made it; only what is shared between threads is touched.
+    let this = unsafe { &*handle };
+    let busy = this.busy.load(Ordering::Acquire);
+    if busy {
+        this.allowance.cancel();
+    }
+    Ok(busy)
+}
+
 /// Tells this thread from all others that live.
 fn this_thread() -> usize {
     thread_local!(static HERE: u8 = const { 0 });
@@ -130,7 +161,7 @@ pub(super) unsafe fn offering<T: Guarded>(handle: *mut Handle<T>, view: *const c
     let this = unsafe { &*handle };
     this.thread.store(this_thread(), Ordering::Relaxed);
     this.offered.store(view.cast_mut(), Ordering::Release);
-    callback();
+    floats::of_host(callback);
     this.offered.store(std::ptr::null_mut(), Ordering::Release);
 }
 
@@ -154,6 +185,7 @@ pub(super) unsafe fn offered<T: Guarded>(handle: *mut Handle<T>) -> *const c_voi
 /// # Errors
 /// The message of the panic.
 pub(super) fn caught<R>(body: impl FnOnce() -> R) -> Result<R, String> {
+    let _ours = floats::Ours::begin();
     hush();
     UNDER_WAY.fetch_add(1, Ordering::Relaxed);
     let outcome = catch_unwind(AssertUnwindSafe(body));
@@ -194,6 +226,9 @@ mod tests {
 
     impl Guarded for Counter {
         const TAG: u64 = 0x1234_5678;
+        fn allowance(&self) -> Arc<Allowance> {
+            Arc::default()
+        }
         fn poison(&mut self, why: String) {
             self.why = Some(why);
         }
@@ -202,6 +237,9 @@ mod tests {
     struct Other;
     impl Guarded for Other {
         const TAG: u64 = 0x8765_4321;
+        fn allowance(&self) -> Arc<Allowance> {
+            Arc::default()
+        }
         fn poison(&mut self, _: String) {}
     }
 

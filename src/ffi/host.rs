@@ -96,6 +96,8 @@ impl Variable {
 
 type Log = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 #[rustfmt::skip]
+type Instantiate2 = unsafe extern "C" fn(*const c_char, c_int, *const c_char, *const c_char, *const [*const c_void; 5], c_int, c_int) -> *mut c_void;
+#[rustfmt::skip]
 type Instantiate = unsafe extern "C" fn(*const c_char, *const c_char, *const c_char, u8, u8, u8, u8, *const u32, usize, *mut c_void, Option<Log>, *const c_void) -> *mut c_void;
 type Free = unsafe extern "C" fn(*mut c_void);
 type Plain = unsafe extern "C" fn(*mut c_void) -> c_int;
@@ -114,6 +116,36 @@ struct Functions {
     get_i32: Get<i32>,
     set_f64: Set<f64>,
     do_step: DoStep,
+}
+
+/// Unpacks an archive of any version, makes an instance of it and frees that.
+///
+/// # Errors
+/// Every [`HostError`] but `NoVariable`.
+pub fn instantiate(archive: &Path, version: FmiVersion) -> Result<(), HostError> {
+    if version.is_3() {
+        return Host::open(archive).map(drop);
+    }
+    let folder = Folder::new()?;
+    unpack(archive, &folder.0)?;
+    let (token, _) = read_description(&folder.0.join("modelDescription.xml"))?;
+    let library = Library::open(&folder.0.join(Platform::here()?.library(version)))?;
+    let (token, resources) = (c_string(&token), c_string(&folder.0.join("resources").display().to_string()));
+    // No logger, no memory functions, no environment: what is wrong with a scene the FMI 3.0 archive tells.
+    let callbacks = [std::ptr::null(); 5];
+    // SAFETY: the types are those of fmi2FunctionTypes.h for these names; strings and callbacks outlive the calls.
+    let instance = unsafe {
+        let instantiate: Instantiate2 = std::mem::transmute(library.symbol(c"fmi2Instantiate")?);
+        let free: Free = std::mem::transmute::<*mut c_void, Free>(library.symbol(c"fmi2FreeInstance")?);
+        let (token, resources) = (token.as_ptr(), resources.as_ptr());
+        let instance = instantiate(c"cutis".as_ptr(), 1, token, resources, &raw const callbacks, 0, 0);
+        free(instance);
+        instance
+    };
+    match instance.is_null() {
+        true => Err(refused("fmi2Instantiate", Status::Error as c_int, &[])),
+        false => Ok(()),
+    }
 }
 
 /// One instance of one archive. Dropping it frees the instance and removes the unpacked folder.
@@ -314,7 +346,7 @@ impl Host {
 impl Drop for Host {
     fn drop(&mut self) {
         // SAFETY: the instance came from instantiate and nobody else has it; log and library are still there. The
-        // library stays loaded: thread-locals pin it anyway.
+        // library stays loaded: it is this program's own.
         unsafe {
             (self.functions.free)(self.instance);
             drop(Box::from_raw(self.log));
@@ -431,7 +463,9 @@ fn read_description(path: &Path) -> Result<(String, Vec<Variable>), HostError> {
                 let name = tag.name().as_ref().to_owned();
                 let read = |key: &str| attribute(tag, key);
                 match name.as_str() {
-                    "fmiModelDescription" => token = read("instantiationToken").unwrap_or_default(),
+                    "fmiModelDescription" => {
+                        token = read("instantiationToken").or_else(|| read("guid")).unwrap_or_default();
+                    }
                     "ModelVariables" => inside = true,
                     "Dimension" if inside => {
                         let extent = read("start").and_then(|n| n.parse().ok());

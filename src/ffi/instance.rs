@@ -5,13 +5,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::guard::Guarded;
-use super::logger::{Category, Logger, Status};
+use super::guard::{self, Denied, Guarded, Handle};
+use super::logger::{Category, Logger, Status, Told};
 use super::modes::{self, Call, Mode};
 use super::resources;
 use super::snapshot::Snapshot;
+use crate::fmu::{self, FmiVersion};
 use crate::port::{Causality, Port, Type};
-use crate::sim::{Model, Sim, StepReport, View};
+use crate::sim::{Allowance, Model, Sim, SimError, StepReport, View};
 
 /// Communication points may differ from the instance's time by this, relative to the larger of time and step: ten
 /// steps of 0.1 add up to 0.9999999999999999.
@@ -32,7 +33,8 @@ pub(super) fn error(message: impl Into<String>) -> Refusal {
     Refusal { status: Status::Error, message: message.into() }
 }
 
-fn discard(message: impl Into<String>) -> Refusal {
+/// What cannot be had now, and ends nothing: the instance is as before the call.
+pub(super) fn discard(message: impl Into<String>) -> Refusal {
     Refusal { status: Status::Discard, message: message.into() }
 }
 
@@ -45,6 +47,8 @@ pub(super) struct Instance {
     pub(super) start: Option<f64>,
     stop: Option<f64>,
     pub(super) logger: Logger,
+    /// The archive that it came from.
+    pub(super) version: FmiVersion,
     /// Saved states; the host holds their addresses and can name no other.
     #[expect(clippy::vec_box, reason = "addresses must not move when the list grows")]
     states: Vec<Box<Snapshot>>,
@@ -56,18 +60,24 @@ impl Instance {
     ///
     /// # Errors
     /// In words: the scene cannot be read, or it is not the one that was described.
-    pub(super) fn open(token: &str, folder: Option<&Path>, logger: Logger) -> Result<Self, (Logger, String)> {
+    pub(super) fn open(
+        token: &str,
+        versions: &[FmiVersion],
+        folder: Option<&Path>,
+        logger: Logger,
+    ) -> Result<Self, (Logger, String)> {
         let model = match resources::model(folder) {
             Ok(model) => model,
             Err(why) => return Err((logger, chain(&why))),
         };
-        if model.token() != token {
+        let described = |version: &&FmiVersion| fmu::token(&model, **version) == token;
+        let Some(&version) = versions.iter().find(described) else {
             let why = format!(
                 "the token is `{token}`, but the scene at hand has `{}`: the description is of another scene or version",
                 model.token()
             );
             return Err((logger, why));
-        }
+        };
         for warning in model.warnings() {
             logger.log(Status::Warning, Category::Warning, warning);
         }
@@ -79,6 +89,7 @@ impl Instance {
                 start: None,
                 stop: None,
                 logger,
+                version,
                 states: Vec::new(),
                 poisoned: None,
             }),
@@ -114,8 +125,13 @@ impl Instance {
         if !start.is_finite() {
             return Err(error(format!("start time {start} is not finite")));
         }
-        if let Some(stop) = stop.filter(|&stop| !(stop.is_finite() && stop > start)) {
-            return Err(error(format!("stop time {stop} does not lie after start time {start}")));
+        if let Some(stop) = stop.filter(|stop| stop.is_nan() || *stop < start) {
+            return Err(error(format!("stop time {stop} lies before start time {start}")));
+        }
+        if let Some(tolerance) = tolerance {
+            let told =
+                format!("tolerance {tolerance:e} is not used: `tolerance` of [solver] in the scene says how far");
+            self.logger.log(Status::Ok, Category::NonlinearSystems, &told);
         }
         self.start = Some(start);
         self.stop = stop;
@@ -139,7 +155,7 @@ impl Instance {
     /// rest, so that a host which looks at outputs in between gets the same bits as one which does not.
     fn refresh(&mut self) -> Answer {
         if self.mode == modes::INITIALIZATION && self.stale {
-            let report = self.sim.initialise().map_err(|why| error(chain(&why)))?;
+            let report = self.sim.initialise().map_err(|why| discard(chain(&why)))?;
             self.tell("initial equilibrium", &report);
             self.stale = false;
         }
@@ -193,7 +209,9 @@ impl Instance {
     /// As after instantiation; logging and saved states stay. The one way back for a poisoned instance.
     pub(super) fn reset(&mut self) -> Answer {
         if self.poisoned.is_some() {
+            let allowance = self.sim.allowance().clone();
             self.sim = Sim::new(self.sim.model().clone()).map_err(|why| error(chain(&why)))?;
+            self.sim.share(&allowance);
             self.poisoned = None;
         } else {
             self.sim.reset();
@@ -218,21 +236,42 @@ impl Instance {
     /// Brings outputs up to date where the standard wants it: in Initialization Mode, when `port` is computed from
     /// values that were set meanwhile. Between steps nothing is ever solved here.
     pub(super) fn before_get(&mut self, port: usize) -> Answer {
-        if self.stale
-            && self.mode == modes::INITIALIZATION
-            && self.sim.model().ports()[port].causality == Causality::Output
-        {
+        if self.stale && self.mode == modes::INITIALIZATION && self.sim.model().ports()[port].is_computed() {
             return self.refresh();
         }
         Ok(())
     }
 
-    /// Whether `values` may be written to `port` from element `offset` on, in this mode.
-    pub(super) fn check_set(&self, port: &Port, offset: usize, values: &[f64]) -> Answer {
+    /// Whether `values` may be written to port `k` from element `offset` on: in this mode, or else Error; by their size and by
+    /// what the scene's bones take, or else Discard, for a host has better values to try.
+    pub(super) fn check_set(&self, k: usize, offset: usize, values: &[f64]) -> Answer {
+        let port = &self.sim.model().ports()[k];
+        self.check_mode(port)?;
+        let wrong = values.iter().position(|&v| {
+            !v.is_finite() || port.min.is_some_and(|min| v < min) || port.max.is_some_and(|max| v > max)
+        });
+        if let Some(k) = wrong {
+            let (min, max) = (port.min.unwrap_or(f64::NEG_INFINITY), port.max.unwrap_or(f64::INFINITY));
+            return Err(discard(format!(
+                "element {} of `{}` was set to {} {}, wanted a finite value from {min} to {max}",
+                offset + k,
+                port.name,
+                values[k],
+                port.unit
+            )));
+        }
+        if port.ty == Type::Float64 {
+            self.sim.check_f64(k, offset, values).map_err(|why| discard(chain(&why)))?;
+        }
+        Ok(())
+    }
+
+    /// Whether a port may be written in this mode at all.
+    fn check_mode(&self, port: &Port) -> Answer {
         let legal = match port.causality {
             Causality::Input | Causality::TunableParameter => modes::INSTANTIATED | modes::INITIALIZATION | modes::STEP,
             Causality::Parameter => modes::INSTANTIATED | modes::INITIALIZATION,
-            Causality::Independent | Causality::Output | Causality::CalculatedParameter => 0,
+            Causality::Independent | Causality::Output | Causality::Local | Causality::CalculatedParameter => 0,
         };
         if legal & self.mode == 0 {
             return Err(error(format!(
@@ -242,28 +281,23 @@ impl Instance {
                 modes::name(self.mode)
             )));
         }
-        let wrong = values.iter().position(|&v| {
-            !v.is_finite() || port.min.is_some_and(|min| v < min) || port.max.is_some_and(|max| v > max)
-        });
-        match wrong {
-            None => Ok(()),
-            Some(k) => {
-                let (min, max) = (port.min.unwrap_or(f64::NEG_INFINITY), port.max.unwrap_or(f64::INFINITY));
-                Err(error(format!(
-                    "element {} of `{}` was set to {} {}, wanted a finite value from {min} to {max}",
-                    offset + k,
-                    port.name,
-                    values[k],
-                    port.unit
-                )))
-            }
-        }
+        Ok(())
     }
 
     /// Writes what [`Instance::check_set`] allowed.
     pub(super) fn set(&mut self, port: usize, offset: usize, values: &[f64]) -> Answer {
         self.stale = true;
         self.sim.set_f64(port, offset, values).map_err(|why| error(chain(&why)))
+    }
+
+    /// As [`Instance::check_set`].
+    pub(super) fn check_i32(&mut self, port: usize, offset: usize, values: &[i32]) -> Answer {
+        values.iter().zip(offset..).try_for_each(|(v, offset)| self.check_set(port, offset, &[f64::from(*v)]))
+    }
+
+    /// Writes what [`Instance::check_i32`] allowed; no equilibrium depends on it.
+    pub(super) fn set_i32(&mut self, port: usize, offset: usize, values: &[i32]) -> Answer {
+        self.sim.set_i32(port, offset, values).map_err(|why| error(chain(&why)))
     }
 
     pub(super) fn get_f64(&self, port: usize, offset: usize, out: &mut [f64]) -> Answer {
@@ -279,13 +313,13 @@ impl Instance {
         sensitivity: &mut [f64],
     ) -> Answer {
         let (unknowns, knowns) = self.before_derivative(unknowns, knowns)?;
-        self.sim.directional_derivative(&knowns, seed, &unknowns, sensitivity).map_err(|why| error(chain(&why)))
+        self.sim.directional_derivative(&knowns, seed, &unknowns, sensitivity).map_err(no_derivative)
     }
 
     /// First derivatives by time of elements of an output; no other order is known.
     pub(super) fn time_derivative(&self, port: usize, offset: usize, orders: &[i32], out: &mut [f64]) -> Answer {
         check_orders(orders)?;
-        self.sim.time_derivative(port, offset, out).map_err(|why| error(chain(&why)))
+        self.sim.time_derivative(port, offset, out).map_err(no_derivative)
     }
 
     /// Gradient of the unknowns weighted by `seed`, as [`Instance::directional_derivative`] transposed.
@@ -297,7 +331,7 @@ impl Instance {
         sensitivity: &mut [f64],
     ) -> Answer {
         let (unknowns, knowns) = self.before_derivative(unknowns, knowns)?;
-        self.sim.adjoint_derivative(&unknowns, seed, &knowns, sensitivity).map_err(|why| error(chain(&why)))
+        self.sim.adjoint_derivative(&unknowns, seed, &knowns, sensitivity).map_err(no_derivative)
     }
 
     /// Ports of unknowns and knowns, with outputs brought up to date.
@@ -402,9 +436,20 @@ fn port(model: &Model, reference: u32, ty: Type) -> Result<(usize, &Port), Refus
     Ok((i, port))
 }
 
+/// What no derivative there is ends nothing; ports and lengths that are none are the host's slip.
+fn no_derivative(why: SimError) -> Refusal {
+    let message = chain(&why);
+    match why {
+        SimError::Port { .. } | SimError::Range { .. } => error(message),
+        _ => discard(message),
+    }
+}
+
 fn check_orders(orders: &[i32]) -> Answer {
     match orders.iter().find(|&&order| order != 1) {
-        Some(order) => Err(error(format!("output derivatives of order {order} are not known, only those of order 1"))),
+        Some(order) => {
+            Err(discard(format!("output derivatives of order {order} are not known, only those of order 1")))
+        }
         None => Ok(()),
     }
 }
@@ -477,7 +522,7 @@ impl Readable for Inside<'_> {
     }
     fn time_derivative(&self, port: usize, offset: usize, orders: &[i32], out: &mut [f64]) -> Answer {
         check_orders(orders)?;
-        self.view.time_derivative(port, offset, out).map_err(|why| error(chain(&why)))
+        self.view.time_derivative(port, offset, out).map_err(no_derivative)
     }
 }
 
@@ -515,8 +560,52 @@ pub(super) struct Instance2 {
     pub(super) last_step: Status,
 }
 
+/// Runs one call on an instance of either version and tells the host's logger what came of it once the call is over.
+///
+/// # Safety
+/// As for [`guard::with`].
+pub(super) unsafe fn answered<T: Common>(handle: *mut Handle<T>, body: impl FnOnce(&mut T) -> Status) -> Status {
+    let mut told = Told::nothing();
+    let mut take = |i: &mut T| told = i.common().logger.take();
+    // SAFETY: the caller's promise.
+    let outcome = unsafe {
+        guard::with(handle, |i| {
+            let status = body(i);
+            take(i);
+            status
+        })
+    };
+    if outcome == Err(Denied::Panicked) {
+        // SAFETY: the caller's promise.
+        let _ = unsafe { guard::with(handle, take) };
+    }
+    told.tell();
+    outcome.unwrap_or(Status::Error)
+}
+
+/// An instance of either version.
+pub(super) trait Common: Guarded {
+    /// What both share.
+    fn common(&mut self) -> &mut Instance;
+}
+
+impl Common for Instance3 {
+    fn common(&mut self) -> &mut Instance {
+        &mut self.common
+    }
+}
+
+impl Common for Instance2 {
+    fn common(&mut self) -> &mut Instance {
+        &mut self.common
+    }
+}
+
 impl Guarded for Instance3 {
     const TAG: u64 = u64::from_le_bytes(*b"cutisFM3");
+    fn allowance(&self) -> Arc<Allowance> {
+        self.common.sim.allowance().clone()
+    }
     fn poison(&mut self, why: String) {
         self.common.poison(why);
     }
@@ -524,6 +613,9 @@ impl Guarded for Instance3 {
 
 impl Guarded for Instance2 {
     const TAG: u64 = u64::from_le_bytes(*b"cutisFM2");
+    fn allowance(&self) -> Arc<Allowance> {
+        self.common.sim.allowance().clone()
+    }
     fn poison(&mut self, why: String) {
         self.common.poison(why);
     }

@@ -18,6 +18,7 @@ pub mod fmi3;
 #[cfg(unix)]
 pub mod host;
 
+mod floats;
 mod guard;
 mod instance;
 mod logger;
@@ -25,3 +26,5 @@ mod modes;
 mod pointer;
 mod resources;
 mod snapshot;
+#[cfg(target_os = "linux")]
+mod unload;

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 
 use quick_xml::Writer;
 
-use super::{FmiVersion, LOG_CATEGORIES, MODEL_IDENTIFIER, scalar_name, scalar_reference};
+use super::{FmiVersion, LOG_CATEGORIES, MODEL_IDENTIFIER, scalar_name, scalar_reference, token};
 use crate::load::Loaded;
-use crate::port::{Causality, Port, Type};
+use crate::port::{Causality, Port, Slot, Type};
 use crate::sim::Model;
 
 type Xml = Writer<Vec<u8>>;
@@ -21,7 +21,7 @@ pub fn description(scene: &Loaded, version: FmiVersion) -> String {
     let mut root: Attributes = vec![
         ("fmiVersion", if version.is_3() { "3.0" } else { "2.0" }.to_owned()),
         ("modelName", model.name().to_owned()),
-        (if version.is_3() { "instantiationToken" } else { "guid" }, model.token().to_owned()),
+        (if version.is_3() { "instantiationToken" } else { "guid" }, token(model, version)),
         ("description", "Soft tissue of the human face: bones move in, skin moves out".to_owned()),
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("license", env!("CARGO_PKG_LICENSE").to_owned()),
@@ -42,12 +42,14 @@ pub fn description(scene: &Loaded, version: FmiVersion) -> String {
             }
         });
         let (stop, step) = (programme.end.to_string(), programme.dt.to_string());
-        let experiment = vec![("startTime", "0".to_owned()), ("stopTime", stop), ("stepSize", step)];
+        let tolerance = relative_tolerance(model).to_string();
+        let experiment =
+            vec![("startTime", "0".to_owned()), ("stopTime", stop), ("tolerance", tolerance), ("stepSize", step)];
         empty(xml, "DefaultExperiment", experiment);
         match version {
             FmiVersion::V3 => {
                 element(xml, "ModelVariables", vec![], |xml| ports.iter().for_each(|p| variable3(xml, p, &types)));
-                structure3(xml, &ports);
+                structure3(xml, model, &ports);
             }
             FmiVersion::V2 | FmiVersion::V2Full => {
                 element(xml, "ModelVariables", vec![], |xml| ports.iter().for_each(|p| variables2(xml, p, &types)));
@@ -67,13 +69,29 @@ const TERMINALS: &[(&str, &str, &str, &str)] = &[
     ("skin", "skin", "bus", "The skin: where it is, where it was at rest, how its vertices are joined"),
 ];
 
-/// The terminals and the icon of the FMI 3.0 archive: one terminal for the variables whose names begin alike.
-pub fn terminals(model: &Model, icon: bool) -> String {
-    let mut groups: BTreeMap<&str, Vec<(&str, &Port)>> = BTreeMap::new();
-    let signals = |p: &&Port| FmiVersion::V3.has(p) && p.causality != Causality::Independent;
+/// Tolerance of the solver in sizes of the tissue.
+fn relative_tolerance(model: &Model) -> f64 {
+    let nodes = &model.mesh().nodes;
+    let (low, high) = nodes.iter().fold((nodes[0], nodes[0]), |(l, h), x| (l.inf(x), h.sup(x)));
+    let relative = model.parts().strategy.tolerance / (high - low).norm();
+    // One digit says it.
+    format!("{relative:.0e}").parse().unwrap_or(relative)
+}
+
+/// The terminals of an archive, and the icon of the FMI 3.0 one: one terminal for the variables whose names begin alike. FMI 2.0
+/// has one member a scalar.
+pub fn terminals(model: &Model, version: FmiVersion, icon: bool) -> String {
+    let mut groups: BTreeMap<&str, Vec<(String, String)>> = BTreeMap::new();
+    let signals = |p: &&Port| version.has(p) && !matches!(p.causality, Causality::Independent | Causality::Local);
     for port in model.ports().iter().filter(signals) {
         if let Some((group, member)) = port.name.split_once('.') {
-            groups.entry(group).or_default().push((member, port));
+            let members = groups.entry(group).or_default();
+            if version.is_3() {
+                members.push((member.to_owned(), port.name.clone()));
+            } else {
+                let scalars = (0..port.len()).map(|k| scalar_name(port, k));
+                members.extend(scalars.map(|name| (name[group.len() + 1..].to_owned(), name)));
+            }
         }
     }
     document("fmiTerminalsAndIcons", vec![("fmiVersion", "3.0".to_owned())], |xml| {
@@ -94,10 +112,10 @@ pub fn terminals(model: &Model, icon: bool) -> String {
                 let mut attributes = vec![("name", name.to_owned()), ("matchingRule", rule.to_owned())];
                 attributes.extend(listed.map(|t| ("description", t.3.to_owned())));
                 element(xml, "Terminal", attributes, |xml| {
-                    for (member, port) in members {
+                    for (member, variable) in members {
                         let attributes = vec![
-                            ("variableName", port.name.clone()),
-                            ("memberName", member.to_owned()),
+                            ("variableName", variable),
+                            ("memberName", member),
                             ("variableKind", "signal".to_owned()),
                         ];
                         empty(xml, "TerminalMemberVariable", attributes);
@@ -160,7 +178,7 @@ const UNITS: &[Unit] = &[
     Unit { name: "1", quantity: "Ratio", base: &[], display: None },
 ];
 
-/// The distinct (unit, range) pairs of the ports, each with the name of its type definition.
+/// One type a quantity: what differs from variable to variable (range, nominal value) stands at the variable.
 struct Types {
     definitions: Vec<Definition>,
 }
@@ -168,17 +186,12 @@ struct Types {
 struct Definition {
     name: String,
     unit: &'static str,
-    ty: Type,
     single: bool,
-    min: Option<f64>,
-    max: Option<f64>,
 }
 
 impl Definition {
     fn fits(&self, port: &Port) -> bool {
-        (self.ty, self.single, self.unit) == (port.ty, port.single, port.unit)
-            && self.min == port.min
-            && self.max == port.max
+        port.ty == Type::Float64 && (self.single, self.unit) == (port.single, port.unit)
     }
 }
 
@@ -191,16 +204,8 @@ impl Types {
             }
             let quantity = UNITS.iter().find(|u| u.name == port.unit).map_or("Quantity", |u| u.quantity);
             // A type may not share its name with a variable; ours begin with a capital, theirs do not.
-            let same = definitions.iter().filter(|d| d.unit == port.unit).count();
-            let name = if same == 0 { quantity.to_owned() } else { format!("{quantity}{}", same + 1) };
-            definitions.push(Definition {
-                name,
-                unit: port.unit,
-                ty: port.ty,
-                single: port.single,
-                min: port.min,
-                max: port.max,
-            });
+            let name = if port.single { format!("Single{quantity}") } else { quantity.to_owned() };
+            definitions.push(Definition { name, unit: port.unit, single: port.single });
         }
         Self { definitions }
     }
@@ -232,8 +237,6 @@ impl Types {
                     attributes.push(("unit", unit.name.to_owned()));
                     attributes.extend(unit.display.map(|(name, _)| ("displayUnit", name.to_owned())));
                 }
-                attributes.extend(definition.min.map(|min| ("min", min.to_string())));
-                attributes.extend(definition.max.map(|max| ("max", max.to_string())));
                 match version {
                     FmiVersion::V3 => {
                         attributes.insert(0, ("name", definition.name.clone()));
@@ -257,6 +260,7 @@ fn causality(port: &Port) -> &'static str {
         Causality::Independent => "independent",
         Causality::Input => "input",
         Causality::Output => "output",
+        Causality::Local => "local",
         Causality::Parameter | Causality::TunableParameter => "parameter",
         Causality::CalculatedParameter => "calculatedParameter",
     }
@@ -272,6 +276,11 @@ fn variability(port: &Port) -> &'static str {
 }
 
 fn is_calculated(port: &Port) -> bool {
+    matches!(port.causality, Causality::Output | Causality::Local | Causality::CalculatedParameter)
+}
+
+/// Whether it is an unknown of the initialization: local variables are none.
+fn is_unknown(port: &Port) -> bool {
     matches!(port.causality, Causality::Output | Causality::CalculatedParameter)
 }
 
@@ -284,6 +293,17 @@ fn start(port: &Port, offset: usize) -> f64 {
 fn about(port: &Port) -> String {
     let sentence = port.description.trim_end_matches('.');
     if port.rows.is_empty() { sentence.to_owned() } else { format!("{sentence}; rows: {}", port.rows.join(", ")) }
+}
+
+/// Range and nominal value, where there is something to say.
+fn bounds(port: &Port) -> Attributes {
+    let mut attributes: Attributes = Vec::new();
+    attributes.extend(port.min.map(|min| ("min", min.to_string())));
+    attributes.extend(port.max.map(|max| ("max", max.to_string())));
+    if port.ty == Type::Float64 && port.nominal != 1.0 {
+        attributes.push(("nominal", port.nominal.to_string()));
+    }
+    attributes
 }
 
 fn variable3(xml: &mut Xml, port: &Port, types: &Types) {
@@ -303,7 +323,11 @@ fn variable3(xml: &mut Xml, port: &Port, types: &Types) {
     if is_calculated(port) {
         attributes.push(("initial", "calculated".to_owned()));
     }
+    if port.is_computed() {
+        attributes.push(("intermediateUpdate", "true".to_owned()));
+    }
     attributes.extend(types.name_for(port).map(|name| ("declaredType", name.to_owned())));
+    attributes.extend(bounds(port));
     if port.is_settable() {
         let values: Vec<String> = (0..port.len()).map(|k| start(port, k).to_string()).collect();
         attributes.push(("start", values.join(" ")));
@@ -339,6 +363,7 @@ fn variables2(xml: &mut Xml, port: &Port, types: &Types) {
         element(xml, "ScalarVariable", attributes, |xml| {
             let mut attributes: Attributes = Vec::new();
             attributes.extend(types.name_for(port).map(|name| ("declaredType", name.to_owned())));
+            attributes.extend(bounds(port));
             if port.is_settable() {
                 attributes.push(("start", start(port, k).to_string()));
             }
@@ -356,10 +381,13 @@ fn variables2(xml: &mut Xml, port: &Port, types: &Types) {
 
 /// Outputs depend on every input and tunable parameter, and in the beginning on the other parameters too: a body in
 /// equilibrium feels all of them.
-fn structure3(xml: &mut Xml, ports: &[&Port]) {
+///
+/// What changes the modes of a scene that moves in modes is no known of it: there are no derivatives by that.
+fn structure3(xml: &mut Xml, model: &Model, ports: &[&Port]) {
     let references = |wanted: &[Causality]| -> String {
-        let found: Vec<String> =
-            ports.iter().filter(|p| wanted.contains(&p.causality)).map(|p| p.reference.to_string()).collect();
+        let of_modes = |p: &Port| model.is_reduced() && matches!(p.slot, Slot::MaterialE(_) | Slot::BonePivot);
+        let felt = |p: &&&Port| p.ty == Type::Float64 && wanted.contains(&p.causality) && !of_modes(p);
+        let found: Vec<String> = ports.iter().filter(felt).map(|p| p.reference.to_string()).collect();
         found.join(" ")
     };
     let inputs = references(&[Causality::Input, Causality::TunableParameter]);
@@ -372,7 +400,7 @@ fn structure3(xml: &mut Xml, ports: &[&Port]) {
                 vec![("valueReference", port.reference.to_string()), ("dependencies", inputs.clone())],
             );
         }
-        for port in ports.iter().filter(|p| is_calculated(p)) {
+        for port in ports.iter().filter(|p| is_unknown(p)) {
             let dependencies = if port.causality == Causality::Output { knowns.clone() } else { String::new() };
             empty(
                 xml,
@@ -405,7 +433,7 @@ fn structure2(xml: &mut Xml, ports: &[&Port]) {
     };
     element(xml, "ModelStructure", vec![], |xml| {
         list(xml, "Outputs", &|p| p.causality == Causality::Output);
-        list(xml, "InitialUnknowns", &is_calculated);
+        list(xml, "InitialUnknowns", &is_unknown);
     });
 }
 

@@ -103,6 +103,7 @@ fn who(port: &Port) -> &'static str {
         Causality::TunableParameter => "parameter, at any time",
         Causality::Parameter => "parameter, before the start",
         Causality::Output => "output",
+        Causality::Local => "of the solver and the elements",
         Causality::CalculatedParameter => "fixed by the scene",
     }
 }

@@ -21,7 +21,10 @@ pub use documentation::documentation;
 pub use package::{Binary, PackageError, package};
 pub use platform::{Platform, UnknownPlatform};
 
+use sha2::{Digest, Sha256};
+
 use crate::port::{Port, Slot};
+use crate::sim::Model;
 
 /// Name of the library inside an archive, and prefix of nothing else.
 pub const MODEL_IDENTIFIER: &str = "cutis";
@@ -113,17 +116,31 @@ pub fn scalar_name(port: &Port, offset: usize) -> String {
     format!("{}[{}]", port.name, indices.join(","))
 }
 
-/// Whether elements of this port have FMI 2.0 value references. Topology and the skin at rest have none: the former is no
-/// number that a host without arrays could use, the latter is the skin before the first step.
-pub fn fits_fmi2(port: &Port) -> bool {
-    let fixed = matches!(port.slot, Slot::SkinRestPosition | Slot::SkinTriangles);
-    !fixed && !port.is_empty() && port.len() <= 1 << ELEMENT_BITS && port.reference < 1 << (32 - ELEMENT_BITS)
+/// Token of the archive of this version: that of the model, but for the full FMI 2.0 archive, whose instances answer to more
+/// references than those of the small one.
+pub fn token(model: &Model, version: FmiVersion) -> String {
+    match version {
+        FmiVersion::V2 | FmiVersion::V3 => model.token().to_owned(),
+        FmiVersion::V2Full => {
+            let digest = Sha256::digest(format!("{} full", model.token()));
+            let hex: String = digest.iter().take(16).map(|b| format!("{b:02x}")).collect();
+            format!("{{{}-{}-{}-{}-{}}}", &hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..])
+        }
+    }
+}
+
+/// Whether elements of this port have FMI 2.0 value references. The skin at rest has none: it is the skin before the first step.
+fn fits_fmi2(port: &Port) -> bool {
+    port.slot != Slot::SkinRestPosition
+        && !port.is_empty()
+        && port.len() <= 1 << ELEMENT_BITS
+        && port.reference < 1 << (32 - ELEMENT_BITS)
 }
 
 /// The skin arrays stay out of the small archive: one scalar for each coordinate makes importers crawl, and markers tell
 /// what a host without arrays can use.
 fn is_skin(port: &Port) -> bool {
-    matches!(port.slot, Slot::SkinPosition | Slot::SkinVelocity)
+    matches!(port.slot, Slot::SkinPosition | Slot::SkinVelocity | Slot::SkinTriangles)
 }
 
 #[cfg(test)]
@@ -143,6 +160,7 @@ mod tests {
             unit: "m",
             causality: Causality::Input,
             start: vec![0.0],
+            nominal: 1.0,
             min: None,
             max: None,
             rows: vec![],

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::picture::picture;
 use super::reference::{self, FOLDER};
-use super::{FmiVersion, Platform, description, documentation, licenses, terminals};
+use super::{FmiVersion, Platform, description, documentation, licenses, terminals, token};
 use crate::load::{Baked, Loaded};
 
 /// Why an archive was not written.
@@ -38,6 +38,14 @@ pub enum PackageError {
     /// What goes into the archive cannot be loaded again.
     #[error(transparent)]
     Scene(#[from] crate::error::Error),
+    /// The packed scene is another one than the described, so no host could instantiate it.
+    #[error("what was packed has the token {found}, but its description {described}: no host could instantiate it")]
+    Other {
+        /// Token of the description.
+        described: String,
+        /// Token of what was packed.
+        found: String,
+    },
     /// The scene's own programme fails in its first steps.
     #[error("the reference run of the component fails, so it would be of no use to a host: {0}")]
     Reference(#[from] crate::sim::SimError),
@@ -63,6 +71,11 @@ pub fn package(
     version: FmiVersion,
 ) -> Result<Vec<u8>, PackageError> {
     check(binaries)?;
+    let packed = baked.load()?;
+    let (described, found) = (token(&scene.model, version), token(&packed.model, version));
+    if described != found {
+        return Err(PackageError::Other { described, found });
+    }
     let mut archive = Archive(ZipWriter::new(Cursor::new(Vec::new())));
     archive.add("modelDescription.xml", 0o644, description(scene, version).as_bytes())?;
     for binary in binaries {
@@ -84,10 +97,10 @@ pub fn package(
     archive.add("documentation/licenses/license.spdx", 0o644, licenses::spdx(scene.model.token()).as_bytes())?;
     archive.add("resources/model.cutis", 0o644, &baked.mesh)?;
     archive.add("resources/scene.toml", 0o644, baked.scene.as_bytes())?;
+    let terminals = terminals(&scene.model, version, picture.is_some() && version.is_3());
+    archive.add("terminalsAndIcons/terminalsAndIcons.xml", 0o644, terminals.as_bytes())?;
     if version.is_3() {
-        let terminals = terminals(&scene.model, picture.is_some());
-        archive.add("terminalsAndIcons/terminalsAndIcons.xml", 0o644, terminals.as_bytes())?;
-        let run = reference::run(Arc::new(baked.load()?.model), &scene.programme)?;
+        let run = reference::run(Arc::new(packed.model), &scene.programme)?;
         archive.add(&format!("{FOLDER}/fmi-ls-manifest.xml"), 0o644, reference::manifest().as_bytes())?;
         archive.add(&format!("{FOLDER}/cutis_in.csv"), 0o644, run.inputs.as_bytes())?;
         archive.add(&format!("{FOLDER}/cutis_out.csv"), 0o644, run.outputs.as_bytes())?;

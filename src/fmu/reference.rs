@@ -34,7 +34,7 @@ pub(super) struct Run {
 /// Those of [`Sim::new`], [`Sim::initialise`] and [`Sim::step`].
 pub(super) fn run(model: Arc<Model>, programme: &Programme) -> Result<Run, SimError> {
     let mut sim = Sim::new(model)?;
-    let set = |p: &Port| p.is_settable() && p.is_continuous();
+    let set = |p: &Port| p.ty == Type::Float64 && p.is_settable() && p.is_continuous();
     let told = |p: &Port| {
         let skin = matches!(p.slot, Slot::SkinPosition | Slot::SkinVelocity);
         p.ty == Type::Float64 && p.is_continuous() && !p.is_settable() && p.slot != Slot::Time && !skin

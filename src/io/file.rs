@@ -9,12 +9,34 @@ use super::IoError;
 /// # Errors
 /// [`IoError::File`], as for every function here.
 pub fn read_text(path: &Path) -> Result<String, IoError> {
+    check_plain(path)?;
     std::fs::read_to_string(path).map_err(IoError::file(path))
 }
 
 /// The bytes of a file.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, IoError> {
+    check_plain(path)?;
     std::fs::read(path).map_err(IoError::file(path))
+}
+
+/// A pipe or a device may never end, so nothing is read from one.
+fn check_plain(path: &Path) -> Result<(), IoError> {
+    let kind = std::fs::metadata(path).map_err(IoError::file(path))?.file_type();
+    if kind.is_file() || kind.is_dir() {
+        return Ok(());
+    }
+    let why = "this is a pipe, a socket or a device; wanted a plain file";
+    Err(IoError::file(path)(std::io::Error::new(std::io::ErrorKind::InvalidInput, why)))
+}
+
+/// Moves a file, replacing an older one.
+pub fn rename(from: &Path, to: &Path) -> Result<(), IoError> {
+    std::fs::rename(from, to).map_err(IoError::file(to))
+}
+
+/// Removes a file.
+pub fn remove_file(path: &Path) -> Result<(), IoError> {
+    std::fs::remove_file(path).map_err(IoError::file(path))
 }
 
 /// Writes a file, replacing an older one.

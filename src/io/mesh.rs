@@ -18,7 +18,7 @@ pub fn read_mesh(path: &Path) -> Result<TetMesh, IoError> {
     if !matches!(kind.as_str(), "cutis" | "vtu" | "vtk" | "msh") {
         return Err(IoError::Extension { path: path.into(), choices: CHOICES });
     }
-    let bytes = std::fs::read(path).map_err(IoError::file(path))?;
+    let bytes = super::file::read_bytes(path)?;
     let mut mesh = match kind.as_str() {
         "cutis" => return baked::decode(&bytes, path),
         "vtu" | "vtk" => vtk::read(&bytes, path, kind == "vtk")?,
@@ -39,7 +39,7 @@ pub fn read_surface(path: &Path) -> Result<FineSkin, IoError> {
     if !matches!(kind.as_str(), "vtu" | "vtk" | "msh") {
         return Err(IoError::Extension { path: path.into(), choices: SURFACE_CHOICES });
     }
-    let bytes = std::fs::read(path).map_err(IoError::file(path))?;
+    let bytes = super::file::read_bytes(path)?;
     let mut skin = if kind == "msh" {
         let mesh = gmsh::read(&bytes, path)?;
         let all = || mesh.face_sets.iter().flat_map(|s| s.triangles.iter().copied()).collect();

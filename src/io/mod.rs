@@ -17,6 +17,6 @@ mod vtk;
 pub use baked::{decode, encode};
 pub use ct::{read_labels, read_volume};
 pub use error::IoError;
-pub use file::{create_folder, read_bytes, read_text, write_bytes};
+pub use file::{create_folder, read_bytes, read_text, remove_file, rename, write_bytes};
 pub use mesh::{read_mesh, read_surface, write_mesh};
 pub use vtk::{Data, write_pvd, write_vtp, write_vtu};

@@ -10,7 +10,7 @@ mod svd;
 mod tensor;
 mod triangle;
 
-pub use pose::{Pose, best_fit, exp_rotation, log_rotation};
+pub use pose::{Pose, best_fit, exp_rotation, left_jacobian, log_rotation};
 pub use psd::clamp_eigenvalues;
 pub use random::Random;
 pub use svd::{Svd, polar, svd};

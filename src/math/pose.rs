@@ -37,6 +37,19 @@ pub fn log_rotation(R: &Mat3) -> Vec3 {
     axis * angle
 }
 
+/// `dR(w) = skew(J dw) R(w)`. Source: Barfoot, "State Estimation for Robotics", 2017, section 7.1.
+pub fn left_jacobian(w: &Vec3) -> Mat3 {
+    let angle = w.norm();
+    let (a, b) = if angle < 1e-3 {
+        let q = angle * angle;
+        (0.5 - q / 24.0, 1.0 / 6.0 - q / 120.0)
+    } else {
+        ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / angle.powi(3))
+    };
+    let W = skew(w);
+    Mat3::identity() + a * W + b * W * W
+}
+
 /// Where a rigid body is, relative to its rest pose: `x = pivot + t + R (X - pivot)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {

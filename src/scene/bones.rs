@@ -119,6 +119,24 @@ impl Builder<'_> {
     }
 }
 
+impl Builder<'_> {
+    /// Where time starts at rest, bones do so, too.
+    pub(super) fn bones_at_rest(&self, specs: &[BoneSpec]) -> Result<(), SceneError> {
+        for spec in specs {
+            for (key, value) in [("translation", &spec.translation), ("rotation", &spec.rotation)] {
+                let Some(at) = value.as_ref().filter(|value| value.get_ref() != &[0.0; 3]) else { continue };
+                let name = spec.name.get_ref();
+                let message = format!(
+                    "`{key}` moves bone `{name}` before time starts, but `start = \"rest\"` of [inertia] starts from rest: \
+                     leave it out, or start in \"equilibrium\""
+                );
+                return Err(self.text.at(at.span().start, message));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Whether a bone is to have no tissue.
 pub(super) fn wants_no_nodes(spec: &BoneSpec) -> bool {
     spec.nodes.as_ref().is_some_and(|nodes| nodes.get_ref() == NO_NODES)

@@ -7,6 +7,7 @@ use super::file::{InertiaSpec, SceneFile};
 use super::materials::{Tissue, stand_in};
 use super::place::nearest_point;
 use super::programme::Programme;
+use super::tables::identity;
 use crate::effect::{Gravity, Inertia, lumped_masses};
 use crate::fem::{Curving, Embedding, add_midsides, curve_midsides};
 use crate::mesh::{SKIN, TetMesh};
@@ -20,6 +21,10 @@ const MEMORY: usize = 8;
 const REFRESH_AFTER: u32 = 20;
 /// Largest nodal motion of the last correction, m.
 const TOLERANCE: f64 = 1e-7;
+/// Most linear solves of a step that the scene sets no bound to, in units of `max_iterations`; where pieces of a step keep an
+/// accuracy, of each of them, of which there may be so many.
+const SOLVES: u32 = 5;
+const MOST_PIECES: u32 = 256;
 /// Round-off of the solver that the estimate of an error in time can bear, in units of its accuracy.
 const NOISE: f64 = 0.1;
 
@@ -130,6 +135,10 @@ impl Builder<'_> {
         start.iter_mut().zip(&tunable).for_each(|(start, (_, E))| *start = *E);
         self.bone_starts(bone, &bones, first_of_contacts, &mesh, &layout, &mut start)?;
 
+        if inertia.as_ref().and_then(|i| i.start.as_ref()).is_some_and(|start| start.get_ref() == "rest") {
+            self.bones_at_rest(bone)?;
+        }
+
         let muscles = self.text.names("muscle", muscle.iter().map(|m| &m.name))?;
         for (k, spec) in muscle.iter().enumerate() {
             let input = layout.first(Slot::MuscleActivation).expect("a scene with muscles has their port") + k;
@@ -194,6 +203,10 @@ impl Builder<'_> {
             spec.map(|s| self.text.choice("solver", "method", &s.method)).transpose()?.flatten() == Some("newton");
         let max_iterations = spec.and_then(|s| s.max_iterations.as_ref());
         let max_iterations = max_iterations.map(|n| self.text.count("solver", "max_iterations", n)).transpose()?;
+        let max_iterations = max_iterations.unwrap_or(200);
+        let most_solves = spec.and_then(|s| s.most_solves.as_ref());
+        let most_solves = most_solves.map(|n| self.text.count("solver", "most_solves", n)).transpose()?;
+        let pieces = if inertia.as_ref().is_some_and(|i| i.accuracy.is_some()) { MOST_PIECES } else { 1 };
         let threads = spec.and_then(|s| s.threads.as_ref());
         let threads = threads.map(|n| self.text.count("solver", "threads", n)).transpose()?.unwrap_or(1);
         let inversion = spec.map(|s| self.text.choice("solver", "inversion", &s.inversion)).transpose()?.flatten();
@@ -220,7 +233,7 @@ impl Builder<'_> {
             memory: if newton { 0 } else { MEMORY },
             refresh_after: if newton { 1 } else { REFRESH_AFTER },
             tolerance,
-            max_iterations: max_iterations.unwrap_or(200),
+            max_iterations,
             without: None,
         };
         let model = Model::new(ModelParts {
@@ -243,8 +256,9 @@ impl Builder<'_> {
             start,
             may_invert: inversion == Some("allow"),
             strategy,
+            most_solves: most_solves.unwrap_or((pieces * SOLVES).saturating_mul(max_iterations)),
             background,
-            identity: without_mesh_table(self.text.0),
+            identity: identity(self.text.0),
             warnings,
         })?;
         let (dt, end) = match run {
@@ -284,17 +298,4 @@ impl Builder<'_> {
             _ => Scheme::BackwardEuler,
         })
     }
-}
-
-/// The scene without its `[mesh...]` and `[skin]` tables: what identifies a model beside its mesh.
-fn without_mesh_table(text: &str) -> String {
-    let mut inside = false;
-    let keep = |line: &&str| {
-        if line.trim_start().starts_with('[') {
-            let name = line.trim_start().trim_start_matches('[').trim_start();
-            inside = name.starts_with("mesh") || name.starts_with("skin");
-        }
-        !inside
-    };
-    text.lines().filter(keep).collect::<Vec<_>>().join("\n")
 }

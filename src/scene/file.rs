@@ -320,6 +320,7 @@ pub struct SolverSpec {
     pub method: Option<Spanned<String>>,
     pub tolerance: Option<Spanned<f64>>,
     pub max_iterations: Option<Spanned<u32>>,
+    pub most_solves: Option<Spanned<u32>>,
     pub inversion: Option<Spanned<String>>,
     pub precision: Option<Spanned<String>>,
     pub linear: Option<Spanned<String>>,

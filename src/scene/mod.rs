@@ -21,6 +21,7 @@ mod reduction;
 mod rest_shape;
 mod source;
 mod springs;
+mod tables;
 mod tissue;
 
 pub use build::build;
@@ -31,6 +32,7 @@ pub use presets::{Preset, preset_reference, presets};
 pub use programme::{Programme, Setting};
 pub use rest_shape::RestShapeError;
 pub use source::{MeshSource, SkinSource};
+pub use tables::packed;
 
 /// Why a scene was refused; line and column are 1-based.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

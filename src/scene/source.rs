@@ -76,16 +76,6 @@ impl SceneFile {
         }))
     }
 
-    /// Order of the elements, if the scene names one.
-    pub fn order(&self) -> Option<u32> {
-        self.mesh.get_ref().order.as_ref().map(|o| *o.get_ref())
-    }
-
-    /// Whether surface edges of quadratic elements are bent.
-    pub fn curved(&self) -> bool {
-        self.mesh.get_ref().curved.as_ref().is_some_and(|c| *c.get_ref())
-    }
-
     /// Where the mesh comes from.
     ///
     /// # Errors

@@ -12,22 +12,30 @@
 //!
 //! Source: Griewank & Walther, "Evaluating Derivatives", 2nd ed., 2008, section 15.3, for the implicit function's adjoint.
 
-use super::derivative::{MOST_PASSES, SETTLED, Sensitivity, check_seed, is_approximate, mismatch, too_strong};
+use super::derivative::{
+    MOST_PASSES, SETTLED, Sensitivity, Unknown, check_seed, check_settled, is_approximate, mismatch, too_strong,
+};
 use super::model::{Drive, Model};
-use super::past::Past;
+use super::outputs::Slope;
+use super::past::{Origin, Past};
 use super::step::{complete, read_pivots};
 use super::{Sim, SimError};
 use crate::fem::{At, Configuration};
-use crate::math::{Mat3, Pose, Vec3, skew};
+use crate::math::{Mat3, Pose, Vec3, left_jacobian, log_rotation};
 use crate::port::Slot;
 
 /// Largest motion in a difference of gradients, in sizes of the model.
 const CHANGE: f64 = 1e-6;
 
 /// Coefficients of what moves: `dL = sum_a x_a . dx_a + sum_b pivot_b . dp_b + sum_a eta_a . dg_a`.
-struct Weights {
+pub(super) struct Weights {
     /// Of node positions.
     x: Vec<Vec3>,
+    /// Of the translations that the bones have reached, and of their turns from there.
+    t: Vec<Vec3>,
+    turn: Vec<Vec3>,
+    /// Of the strain energy.
+    elastic: f64,
     /// Of the current pivots of the bones.
     pivot: Vec<Vec3>,
     /// Of the nodal gradient.
@@ -37,7 +45,7 @@ struct Weights {
 }
 
 /// The accepted state with what its transposed stiffness needs.
-struct Place<'a> {
+pub(super) struct Place<'a> {
     model: &'a Model,
     past: &'a Past,
     at: At<'a>,
@@ -46,6 +54,8 @@ struct Place<'a> {
     pivots: &'a [Vec3],
     /// Gradient at the nodes, N.
     g: &'a [Vec3],
+    /// Velocities of the nodes, m/s; none in quasi-static scenes.
+    v: &'a [Vec3],
     /// Size of the model, m.
     size: f64,
 }
@@ -72,7 +82,28 @@ impl Sim {
         if n != sensitivity.len() {
             return Err(mismatch("sensitivity", n, sensitivity));
         }
+        check_settled(&self.state)?;
+        let unknown_ports = self.unknowns(unknowns)?;
+        let n = unknown_ports.iter().map(|(_, n)| n).sum();
+        if n != seed.len() {
+            return Err(mismatch("seed", n, seed));
+        }
         check_seed(seed)?;
+        let mut of_inputs = vec![0.0; model.parts().layout.len()];
+        let mut left = seed;
+        for (unknown, n) in &unknown_ports {
+            let (w, later) = left.split_at(*n);
+            if let Unknown::Input(first) = unknown {
+                of_inputs[*first..].iter_mut().zip(w).for_each(|(sum, w)| *sum += w);
+            }
+            left = later;
+        }
+        if model.remembers() && self.work.kept.origin == Origin::Rest {
+            // Nothing has moved yet, whatever the inputs.
+            let elements = wanted.into_iter().flat_map(|(_, range)| range);
+            elements.zip(sensitivity).for_each(|(k, out)| *out = of_inputs[k]);
+            return Ok(());
+        }
         if model.is_reduced() {
             let elements = wanted.into_iter().flat_map(|(_, range)| range);
             return self.replayed_adjoint(unknowns, seed, elements, sensitivity);
@@ -83,11 +114,7 @@ impl Sim {
         read_pivots(&model, &self.state.applied, &mut pivots);
         let config = self.state.config.clone();
         let inputs = self.state.applied.clone();
-        let mut unknown_ports = Vec::new();
-        for &unknown in unknowns {
-            let port = self.unknown(unknown)?;
-            unknown_ports.push((port.slot, port.len()));
-        }
+        let v = self.state.motion.v.clone();
         let Sensitivity { minimiser, past, .. } = self.sensitivity(&model)?;
         let at = At { x_lag: &config.x, ..past.at(&model, &inputs, &past.x_tilde) };
         let mut g = vec![Vec3::zeros(); config.x.len()];
@@ -97,21 +124,16 @@ impl Sim {
         let X = &model.mesh().nodes;
         let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
         let size = (high - low).norm();
-        let place = Place { model: &model, past, at, config: &config, pivots: &pivots, g: &g, size };
+        let place = Place { model: &model, past, at, config: &config, pivots: &pivots, g: &g, v: &v, size };
 
         let mut weights = Weights::nothing(&place);
-        let mut of_inputs = vec![0.0; inputs.len()];
         let mut left = seed;
-        for (slot, n) in unknown_ports {
-            let (w, later) = left.split_at_checked(n).ok_or_else(|| mismatch("seed", n, left))?;
-            match parts.layout.first(slot) {
-                Some(first) => of_inputs[first..].iter_mut().zip(w).for_each(|(sum, w)| *sum += w),
-                None => weights.add(&place, slot, w),
+        for (unknown, n) in &unknown_ports {
+            let (w, later) = left.split_at(*n);
+            if let Unknown::Output(Slope::Of(_, across)) = unknown {
+                across(&mut weights, &place, w);
             }
             left = later;
-        }
-        if !left.is_empty() {
-            return Err(mismatch("seed", 0, left));
         }
 
         weights.settle(&place);
@@ -120,7 +142,7 @@ impl Sim {
         let xi: Vec<Vec3> = place.spread(&lambda).iter().zip(&weights.eta).map(|(l, e)| l + e).collect();
         let mut q = place.transposed(&xi);
         q.iter_mut().zip(&weights.x).for_each(|(q, w)| *q += w);
-        let contraction = Contraction { place: &place, lambda: &lambda, xi: &xi, q: &q, pivot: &weights.pivot };
+        let contraction = Contraction { place: &place, lambda: &lambda, xi: &xi, q: &q, weights: &weights };
         let mut left = sensitivity;
         for (slot, range) in wanted {
             let (now, later) = left.split_at_mut(range.len());
@@ -135,48 +157,101 @@ impl Sim {
 impl Weights {
     fn nothing(place: &Place) -> Weights {
         let n = place.config.x.len();
+        let n_bones = place.pivots.len();
         Weights {
             x: vec![Vec3::zeros(); n],
-            pivot: vec![Vec3::zeros(); place.pivots.len()],
+            t: vec![Vec3::zeros(); n_bones],
+            turn: vec![Vec3::zeros(); n_bones],
+            elastic: 0.0,
+            pivot: vec![Vec3::zeros(); n_bones],
             eta: vec![Vec3::zeros(); n],
             v: Vec::new(),
         }
     }
 
-    /// Velocities counted as positions.
+    /// Velocities and strain energy counted as positions.
     fn settle(&mut self, place: &Place) {
         let rates = place.past.rates(place.model.dofs());
         self.x.iter_mut().zip(self.v.drain(..)).zip(rates).for_each(|((x, v), rate)| *x += rate * v);
-    }
-
-    /// Weighs the rows of one output.
-    fn add(&mut self, place: &Place, slot: Slot, w: &[f64]) {
-        let parts = place.model.parts();
-        for (k, w) in w.chunks_exact(3).map(Vec3::from_column_slice).enumerate() {
-            match slot {
-                Slot::SkinPosition => place.model.skin().add_transposed(k, &w, &mut self.x),
-                Slot::SkinVelocity => {
-                    self.v.resize(self.x.len(), Vec3::zeros());
-                    place.model.skin().add_transposed(k, &w, &mut self.v);
-                }
-                Slot::MarkerPosition => {
-                    let marker = &parts.markers[k];
-                    place.model.skin().add_within_transposed(marker.nodes, marker.weights, &w, &mut self.x);
-                }
-                // f = -sum_a g_a
-                Slot::BoneReactionForce => parts.bones[k].nodes.iter().for_each(|&a| self.eta[a as usize] -= w),
-                // m = -sum_a r_a x g_a with r_a = x_a - p
-                _ => {
-                    for &a in &parts.bones[k].nodes {
-                        let (r, g) = (place.arm(k, a), place.g[a as usize]);
-                        self.eta[a as usize] -= w.cross(&r);
-                        self.x[a as usize] += w.cross(&g);
-                        self.pivot[k] -= w.cross(&g);
-                    }
-                }
+        if self.elastic != 0.0 {
+            let mut g = vec![Vec3::zeros(); self.x.len()];
+            let at = At { x_lag: &place.config.x, ..place.past.still(place.at.inputs) };
+            for term in place.model.parts().terms.iter().filter(|t| t.is_elastic()) {
+                term.add_gradient(&at, &place.config.x, &mut g);
             }
+            self.x.iter_mut().zip(&g).for_each(|(x, g)| *x += self.elastic * g);
         }
     }
+
+    /// Weights of nodal velocities.
+    fn v(&mut self) -> &mut [Vec3] {
+        self.v.resize(self.x.len(), Vec3::zeros());
+        &mut self.v
+    }
+}
+
+fn rows(w: &[f64]) -> impl Iterator<Item = (usize, Vec3)> {
+    w.chunks_exact(3).map(Vec3::from_column_slice).enumerate()
+}
+
+pub(super) fn skin_position(weights: &mut Weights, place: &Place, w: &[f64]) {
+    rows(w).for_each(|(k, w)| place.model.skin().add_transposed(k, &w, &mut weights.x));
+}
+pub(super) fn skin_velocity(weights: &mut Weights, place: &Place, w: &[f64]) {
+    rows(w).for_each(|(k, w)| place.model.skin().add_transposed(k, &w, weights.v()));
+}
+pub(super) fn marker_position(weights: &mut Weights, place: &Place, w: &[f64]) {
+    for (k, w) in rows(w) {
+        let marker = &place.model.parts().markers[k];
+        place.model.skin().add_within_transposed(marker.nodes, marker.weights, &w, &mut weights.x);
+    }
+}
+/// f = -sum_a g_a
+pub(super) fn reaction_force(weights: &mut Weights, place: &Place, w: &[f64]) {
+    for (k, w) in rows(w) {
+        place.model.parts().bones[k].nodes.iter().for_each(|&a| weights.eta[a as usize] -= w);
+    }
+}
+/// m = -sum_a r_a x g_a with r_a = x_a - p
+pub(super) fn reaction_torque(weights: &mut Weights, place: &Place, w: &[f64]) {
+    for (k, w) in rows(w) {
+        for &a in &place.model.parts().bones[k].nodes {
+            let (r, g) = (place.arm(k, a), place.g[a as usize]);
+            weights.eta[a as usize] -= w.cross(&r);
+            weights.x[a as usize] += w.cross(&g);
+            weights.pivot[k] -= w.cross(&g);
+        }
+    }
+}
+pub(super) fn pose_translation(weights: &mut Weights, _: &Place, w: &[f64]) {
+    rows(w).for_each(|(k, w)| weights.t[k] += w);
+}
+/// A turn by dw from R = exp(r) changes r by J(r)^-1 dw.
+pub(super) fn pose_rotation(weights: &mut Weights, place: &Place, w: &[f64]) {
+    for (k, w) in rows(w) {
+        let J = left_jacobian(&log_rotation(&place.config.poses[k].R));
+        weights.turn[k] += J.try_inverse().map_or(w, |inverse| inverse.tr_mul(&w));
+    }
+}
+/// f = -sum_i g_i over its frame
+pub(super) fn contact_force(weights: &mut Weights, place: &Place, w: &[f64]) {
+    for (k, w) in rows(w) {
+        place.model.parts().contacts[k].frame.iter().for_each(|&a| weights.eta[a as usize] -= w);
+    }
+}
+pub(super) fn contact_depth(weights: &mut Weights, place: &Place, w: &[f64]) {
+    let parts = place.model.parts();
+    for (contact, w) in parts.contacts.iter().zip(w) {
+        parts.terms[contact.term].add_depth_gradient(*w, &place.config.x, &mut weights.x);
+    }
+}
+pub(super) fn elastic(weights: &mut Weights, _: &Place, w: &[f64]) {
+    weights.elastic += w[0];
+}
+pub(super) fn kinetic(weights: &mut Weights, place: &Place, w: &[f64]) {
+    let Some(inertia) = &place.model.parts().inertia else { return };
+    let moving = inertia.m.iter().zip(place.v);
+    weights.v().iter_mut().zip(moving).for_each(|(of, (m, v))| *of += w[0] * *m * v);
 }
 
 impl Place<'_> {
@@ -259,7 +334,8 @@ impl Place<'_> {
         q.iter_mut().zip(&weights.x).for_each(|(q, w)| *q += w);
         let mut c = self.gather(&q);
         for body in &self.model.dofs().bodies {
-            c[body.block as usize] += weights.pivot[body.bone];
+            c[body.block as usize] += weights.pivot[body.bone] + weights.t[body.bone];
+            c[body.block as usize + 1] += weights.turn[body.bone];
         }
         c.iter_mut().for_each(|c| *c = -*c);
         let mut lambda = c.clone();
@@ -293,8 +369,8 @@ struct Contraction<'a> {
     xi: &'a [Vec3],
     /// Coefficients of the nodal positions, `xi` contracted with the stiffness included.
     q: &'a [Vec3],
-    /// Coefficients of the current pivots.
-    pivot: &'a [Vec3],
+    /// Coefficients of what bones and energy are.
+    weights: &'a Weights,
 }
 
 impl Contraction<'_> {
@@ -322,24 +398,25 @@ impl Contraction<'_> {
 
     fn by_bone(&self, slot: Slot, b: usize) -> Vec3 {
         let Place { model, config, g, at, .. } = self.place;
+        let Weights { t, turn, pivot, .. } = self.weights;
         let bone = &model.parts().bones[b];
         let q = |a: &u32| self.q[*a as usize];
         let body = model.dofs().bodies.iter().find(|body| body.bone == b);
         let pushed = || bone.nodes.iter().map(q).sum::<Vec3>();
         match slot {
-            Slot::BoneTranslation if bone.drive == Drive::Pose => pushed() + self.pivot[b],
+            Slot::BoneTranslation if bone.drive == Drive::Pose => pushed() + pivot[b] + t[b],
             Slot::BoneRotation if bone.drive == Drive::Pose => {
                 let first = model.parts().layout.first(slot).expect("a port of the model") + 3 * b;
                 let w = Vec3::from_column_slice(&at.inputs[first..first + 3]);
                 let twist: Vec3 = bone.nodes.iter().map(|a| self.place.arm(b, *a).cross(&q(a))).sum();
-                left_jacobian(&w).tr_mul(&twist)
+                left_jacobian(&w).tr_mul(&(twist + turn[b]))
             }
             Slot::BoneForce => body.map_or(Vec3::zeros(), |body| -self.lambda[body.block as usize]),
             Slot::BoneTorque => body.map_or(Vec3::zeros(), |body| -self.lambda[body.block as usize + 1]),
             Slot::BonePivot => {
                 // dx = (I - R) dp, and the arms of a force-driven bone turn by -R dp.
                 let Pose { R, .. } = config.poses[b];
-                let mut by = (Mat3::identity() - R).tr_mul(&pushed()) + self.pivot[b];
+                let mut by = (Mat3::identity() - R).tr_mul(&pushed()) + pivot[b];
                 if let Some(body) = body {
                     let held: Vec3 = bone.nodes.iter().map(|&a| g[a as usize]).sum();
                     by -= R.tr_mul(&held.cross(&self.lambda[body.block as usize + 1]));
@@ -350,9 +427,10 @@ impl Contraction<'_> {
         }
     }
 
-    /// `xi . dg/ds_k`, by a difference of the terms that read it.
+    /// `xi . dg/ds_k`, with the strain energy's own share, by a difference of the terms that read it.
     fn by_input(&self, k: usize) -> f64 {
-        let Place { model, config, at, .. } = self.place;
+        let place = self.place;
+        let Place { model, config, at, .. } = place;
         let mut inputs = at.inputs.to_vec();
         let h = at.inputs[k].abs().max(1.0);
         let mut g = vec![Vec3::zeros(); config.x.len()];
@@ -360,25 +438,16 @@ impl Contraction<'_> {
             inputs[k] = value;
             let at = At { inputs: &inputs, ..*at };
             g.fill(Vec3::zeros());
+            let mut elastic = 0.0;
             for term in model.parts().terms.iter().filter(|t| t.inputs().contains(&k)) {
                 term.add_gradient(&at, &config.x, &mut g);
+                if self.weights.elastic != 0.0 {
+                    elastic += self.weights.elastic * term.strain(&place.past.still(&inputs), &config.x).energy;
+                }
             }
-            g.iter().zip(self.xi).map(|(g, xi)| g.dot(xi)).sum::<f64>()
+            elastic + g.iter().zip(self.xi).map(|(g, xi)| g.dot(xi)).sum::<f64>()
         };
         let value = at.inputs[k];
         (side(value + h) - side(value - h)) / (2.0 * h)
     }
-}
-
-/// `dR(w) = skew(J dw) R(w)`. Source: Barfoot, "State Estimation for Robotics", 2017, section 7.1.
-fn left_jacobian(w: &Vec3) -> Mat3 {
-    let angle = w.norm();
-    let (a, b) = if angle < 1e-3 {
-        let q = angle * angle;
-        (0.5 - q / 24.0, 1.0 / 6.0 - q / 120.0)
-    } else {
-        ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / angle.powi(3))
-    };
-    let W = skew(w);
-    Mat3::identity() + a * W + b * W * W
 }

@@ -17,11 +17,13 @@
 use std::ops::Range;
 
 use super::linearisation::with_problem;
-use super::past::Past;
-use super::step::{place_bones, read_pivots, read_wrenches, target_increments};
+use super::outputs::Slope;
+use super::past::{Origin, Past};
+use super::ports::Source;
+use super::step::{place_bones, read_pivots, read_wrenches, strain_at, target_increments};
 use super::{Model, Sim, SimError, SolveError, State};
 use crate::fem::Configuration;
-use crate::math::Vec3;
+use crate::math::{Vec3, left_jacobian, log_rotation};
 use crate::port::{Port, Slot, Type};
 use crate::solve::{Minimiser, Problem, Strategy};
 
@@ -56,6 +58,25 @@ struct Held {
     g: Vec<Vec3>,
     config: Configuration,
     pivots: Vec<Vec3>,
+    inputs: Vec<f64>,
+}
+
+/// Both sides of a state, and what outputs are read with.
+pub(super) struct Ends<'a> {
+    model: &'a Model,
+    past: &'a Past,
+    /// The state between them.
+    here: &'a State,
+    sides: &'a [Held; 2],
+    h: f64,
+}
+
+/// How an unknown of a derivative changes.
+pub(super) enum Unknown {
+    /// It is an input itself, the first of so many among all inputs.
+    Input(usize),
+    /// As the row of an output says.
+    Output(Slope),
 }
 
 /// Along the seed, and against it.
@@ -73,16 +94,17 @@ impl Sim {
     /// Change of the ports `unknowns` with the ports `knowns` along `seed`, at the last accepted state: `sensitivity` is
     /// overwritten with the directional derivative of each element of the unknowns, one after another.
     ///
-    /// Knowns are inputs; unknowns are `skin.position`, `skin.velocity`, `marker.position`, `bone.reactionForce` and
-    /// `bone.reactionTorque`, or inputs themselves. Linear in the seed to about eight digits.
+    /// Knowns are inputs; unknowns are outputs (skin, markers, poses, reactions, contacts, energies) or inputs themselves. Linear
+    /// in the seed to about eight digits.
     ///
     /// In scenes with inertia or memory it is the derivative of the last piece of the step (all of it, unless it was cut) by
-    /// the inputs at its end, what came before held.
+    /// the inputs at its end, what came before held; a saved state carries what that wants.
     ///
     /// # Errors
-    /// [`SimError::NoDerivative`] before the first equilibrium, in scenes with inertia or memory where no step of this run led
-    /// to the state, and in scenes in modes by moduli and pivots; [`SimError::Port`], [`SimError::Range`], and as for
-    /// [`Sim::step`] if the stiffness cannot be factored. The state does not change.
+    /// [`SimError::NoDerivative`] before the first equilibrium, of ports that tell of the solver and the elements, in scenes with
+    /// inertia or memory after [`Sim::start_from`], and in scenes in modes by moduli and pivots; [`SimError::Port`],
+    /// [`SimError::Range`], [`SimError::SeedNotFinite`], and as for [`Sim::step`] if the stiffness cannot be factored. The state
+    /// does not change.
     pub fn directional_derivative(
         &mut self,
         knowns: &[usize],
@@ -92,8 +114,11 @@ impl Sim {
     ) -> Result<(), SimError> {
         let model = self.model.clone();
         super::step::complete(&model, &mut self.state, &self.work);
-        if !model.is_reduced() {
-            self.sensitivity(&model)?;
+        check_settled(&self.state)?;
+        let wanted = self.unknowns(unknowns)?;
+        let n = wanted.iter().map(|(_, n)| n).sum();
+        if n != sensitivity.len() {
+            return Err(mismatch("sensitivity", n, sensitivity));
         }
         let mut direction = vec![0.0; model.parts().layout.len()];
         let mut left = seed;
@@ -107,13 +132,18 @@ impl Sim {
             return Err(mismatch("seed", 0, left));
         }
         check_seed(&direction)?;
+        let scale = direction.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let at_rest = model.remembers() && self.work.kept.origin == Origin::Rest;
+        if scale == 0.0 || at_rest {
+            // Where a scene starts at rest nothing has moved yet, whatever the inputs.
+            each(&wanted, sensitivity, |unknown, out| match unknown {
+                Unknown::Input(first) => out.copy_from_slice(&direction[*first..first + out.len()]),
+                Unknown::Output(_) => out.fill(0.0),
+            });
+            return Ok(());
+        }
         if model.is_reduced() {
             return self.replayed(&direction, unknowns, sensitivity);
-        }
-        let scale = direction.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        if scale == 0.0 {
-            sensitivity.fill(0.0);
-            return Ok(());
         }
         let first = FIRST_CHANGE / scale;
         let motion = self.sides(&model, &direction, first, 1)?.motion();
@@ -121,19 +151,14 @@ impl Sim {
         let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
         let h = if motion > 0.0 { first * CHANGE * (high - low).norm() / motion } else { first };
         let Sides(sides) = self.sides(&model, &direction, h, MOST_PASSES)?;
-        let mut left = sensitivity;
-        for &unknown in unknowns {
-            let port = self.unknown(unknown)?;
-            let n = port.len();
-            if n > left.len() {
-                return Err(mismatch("sensitivity", n, left));
-            }
-            let (now, later) = left.split_at_mut(n);
-            let past = &self.sensitivity.as_ref().expect("made above").past;
-            read(&model, past, &sides, port.slot, &direction, h, now);
-            left = later;
-        }
-        if left.is_empty() { Ok(()) } else { Err(mismatch("sensitivity", 0, left)) }
+        let past = &self.sensitivity.as_ref().expect("made for the sides").past;
+        let ends = Ends { model: &model, past, here: &self.state, sides: &sides, h };
+        each(&wanted, sensitivity, |unknown, out| match unknown {
+            Unknown::Input(first) => out.copy_from_slice(&direction[*first..first + out.len()]),
+            Unknown::Output(Slope::Of(along, _)) => along(&ends, out),
+            Unknown::Output(Slope::Zero | Slope::None) => out.fill(0.0),
+        });
+        Ok(())
     }
 
     /// The equilibria a step `h` along the direction and against it, to first order; one pass leaves out how follower
@@ -180,14 +205,32 @@ impl Sim {
 
     /// An input that derivatives can be taken by, and where it lies among all inputs.
     pub(super) fn known(&self, k: usize) -> Result<(Slot, Range<usize>), SimError> {
-        let port = self.port(k, Type::Float64, "an input that derivatives can be taken by", |p| p.is_settable())?;
-        let first = self.model.parts().layout.first(port.slot).expect("every settable port lies in the layout");
-        Ok((port.slot, first..first + port.len()))
+        let wanted = "an input that derivatives can be taken by";
+        let port = self.port(k, Type::Float64, wanted, |p| p.is_settable())?;
+        match self.model.source(k) {
+            Source::Input(first) => Ok((port.slot, first..first + port.len())),
+            Source::MostSolves | Source::Computed(_) => {
+                Err(SimError::Port { port: k, n_ports: self.model.ports().len(), wanted })
+            }
+        }
     }
 
-    /// An output that has derivatives, or an input.
-    pub(super) fn unknown(&self, k: usize) -> Result<&Port, SimError> {
-        self.port(k, Type::Float64, "an output that has derivatives", has_derivative)
+    /// How each of these changes, and how many values it has.
+    pub(super) fn unknowns(&self, ports: &[usize]) -> Result<Vec<(Unknown, usize)>, SimError> {
+        let unknown = |&k: &usize| {
+            let port: &Port = self.port(k, Type::Float64, "an output or an input of type Float64", |_| true)?;
+            let unknown = match self.model.source(k) {
+                Source::Input(first) => Unknown::Input(first),
+                Source::Computed(row) => Unknown::Output(row.slope),
+                Source::MostSolves => Unknown::Output(Slope::None),
+            };
+            if let Unknown::Output(Slope::None) = unknown {
+                let why = format!("`{}` tells of the solver or of single elements, not of the tissue", port.name);
+                return Err(SimError::NoDerivative(why));
+            }
+            Ok((unknown, port.len()))
+        };
+        ports.iter().map(unknown).collect()
     }
 
     /// The factor at the accepted state, and its past; made where the last one was another's.
@@ -252,7 +295,7 @@ impl Moved {
         let mut nodal = vec![Vec3::zeros(); parts.mesh.nodes.len()];
         let mut g = vec![Vec3::zeros(); model.dofs().n_blocks()];
         problem.gradient(&config, &config, &mut nodal, &mut g);
-        Held { nodal, g, config, pivots: self.pivots.clone() }
+        Held { nodal, g, config, pivots: self.pivots.clone(), inputs: self.inputs.clone() }
     }
 }
 
@@ -268,55 +311,94 @@ pub(super) fn check_settled(state: &State) -> Result<(), SimError> {
 
 /// Seeds are numbers.
 pub(super) fn check_seed(seed: &[f64]) -> Result<(), SimError> {
-    let finite = seed.iter().all(|v| v.is_finite());
-    if finite { Ok(()) } else { Err(SimError::NoDerivative("the seed is not finite".into())) }
+    match seed.iter().position(|v| !v.is_finite()) {
+        Some(k) => Err(SimError::SeedNotFinite(k)),
+        None => Ok(()),
+    }
 }
 
-fn has_derivative(port: &Port) -> bool {
-    use Slot::{BoneReactionForce, BoneReactionTorque, MarkerPosition, SkinPosition, SkinVelocity};
-    let is_one =
-        matches!(port.slot, SkinPosition | SkinVelocity | MarkerPosition | BoneReactionForce | BoneReactionTorque);
-    is_one || port.is_settable()
+/// Hands each unknown its part of `all`.
+fn each(unknowns: &[(Unknown, usize)], all: &mut [f64], mut write: impl FnMut(&Unknown, &mut [f64])) {
+    let mut left = all;
+    for (unknown, n) in unknowns {
+        let (now, later) = left.split_at_mut(*n);
+        write(unknown, now);
+        left = later;
+    }
 }
 
-/// The derivative of one port.
-fn read(model: &Model, past: &Past, sides: &[Held; 2], slot: Slot, direction: &[f64], h: f64, out: &mut [f64]) {
-    let of = |value: &dyn Fn(&Held) -> Vec3| (value(&sides[0]) - value(&sides[1])) / (2.0 * h);
-    let rows = |row: &dyn Fn(usize, &Held) -> Vec3, out: &mut [f64]| {
+impl Ends<'_> {
+    /// The difference of what `row` tells of each side.
+    fn rows(&self, out: &mut [f64], row: impl Fn(usize, &Held) -> Vec3) {
+        let [plus, minus] = self.sides;
         for (k, out) in out.chunks_exact_mut(3).enumerate() {
-            out.copy_from_slice(of(&|side| row(k, side)).as_slice());
-        }
-    };
-    let parts = model.parts();
-    match slot {
-        Slot::SkinPosition => rows(&|k, side| model.skin().of(k, &side.config.x), out),
-        Slot::SkinVelocity => {
-            let moved = sides[0].config.x.iter().zip(&sides[1].config.x);
-            let v: Vec<Vec3> =
-                moved.zip(past.rates(model.dofs())).map(|((p, m), rate)| rate / (2.0 * h) * (p - m)).collect();
-            model.skin().gather(&v, 0, out);
-        }
-        Slot::MarkerPosition => rows(
-            &|k, side| {
-                let marker = &parts.markers[k];
-                model.skin().within(marker.nodes, marker.weights, &side.config.x)
-            },
-            out,
-        ),
-        Slot::BoneReactionForce => {
-            rows(&|k, side| parts.bones[k].nodes.iter().map(|&a| -side.nodal[a as usize]).sum(), out);
-        }
-        Slot::BoneReactionTorque => rows(
-            &|k, side| {
-                let pivot = side.pivots[k] + side.config.poses[k].t;
-                let torque = |&a: &u32| (pivot - side.config.x[a as usize]).cross(&side.nodal[a as usize]);
-                parts.bones[k].nodes.iter().map(torque).sum()
-            },
-            out,
-        ),
-        input => {
-            let first = parts.layout.first(input).expect("every other port is an input");
-            out.copy_from_slice(&direction[first..first + out.len()]);
+            out.copy_from_slice(((row(k, plus) - row(k, minus)) / (2.0 * self.h)).as_slice());
         }
     }
+
+    /// The same of numbers.
+    fn numbers(&self, out: &mut [f64], number: impl Fn(usize, &Held) -> f64) {
+        let [plus, minus] = self.sides;
+        for (k, out) in out.iter_mut().enumerate() {
+            *out = (number(k, plus) - number(k, minus)) / (2.0 * self.h);
+        }
+    }
+
+    /// How the nodes' velocities change.
+    fn velocities(&self) -> Vec<Vec3> {
+        let [plus, minus] = self.sides;
+        let moved = plus.config.x.iter().zip(&minus.config.x);
+        let rates = self.past.rates(self.model.dofs());
+        moved.zip(rates).map(|((p, m), rate)| rate / (2.0 * self.h) * (p - m)).collect()
+    }
+}
+
+pub(super) fn skin_position(ends: &Ends, out: &mut [f64]) {
+    ends.rows(out, |k, side| ends.model.skin().of(k, &side.config.x));
+}
+pub(super) fn skin_velocity(ends: &Ends, out: &mut [f64]) {
+    ends.model.skin().gather(&ends.velocities(), 0, out);
+}
+pub(super) fn marker_position(ends: &Ends, out: &mut [f64]) {
+    ends.rows(out, |k, side| {
+        let marker = &ends.model.parts().markers[k];
+        ends.model.skin().within(marker.nodes, marker.weights, &side.config.x)
+    });
+}
+pub(super) fn reaction_force(ends: &Ends, out: &mut [f64]) {
+    ends.rows(out, |k, side| ends.model.parts().bones[k].nodes.iter().map(|&a| -side.nodal[a as usize]).sum());
+}
+pub(super) fn reaction_torque(ends: &Ends, out: &mut [f64]) {
+    ends.rows(out, |k, side| {
+        let pivot = side.pivots[k] + side.config.poses[k].t;
+        let torque = |&a: &u32| (pivot - side.config.x[a as usize]).cross(&side.nodal[a as usize]);
+        ends.model.parts().bones[k].nodes.iter().map(torque).sum()
+    });
+}
+pub(super) fn pose_translation(ends: &Ends, out: &mut [f64]) {
+    ends.rows(out, |k, side| side.config.poses[k].t);
+}
+/// The turn between the sides as a change of the rotation vector, which itself may jump between them.
+pub(super) fn pose_rotation(ends: &Ends, out: &mut [f64]) {
+    let [plus, minus] = ends.sides;
+    for (k, out) in out.chunks_exact_mut(3).enumerate() {
+        let turn = log_rotation(&(plus.config.poses[k].R * minus.config.poses[k].R.transpose())) / (2.0 * ends.h);
+        let J = left_jacobian(&log_rotation(&ends.here.config.poses[k].R));
+        out.copy_from_slice(J.try_inverse().map_or(turn, |inverse| inverse * turn).as_slice());
+    }
+}
+/// What its frame feels: nothing else acts on those nodes.
+pub(super) fn contact_force(ends: &Ends, out: &mut [f64]) {
+    ends.rows(out, |k, side| ends.model.parts().contacts[k].frame.iter().map(|&a| -side.nodal[a as usize]).sum());
+}
+pub(super) fn contact_depth(ends: &Ends, out: &mut [f64]) {
+    ends.numbers(out, |k, side| ends.model.touch(k, &ends.past.still(&side.inputs), &side.config.x).depth());
+}
+pub(super) fn elastic(ends: &Ends, out: &mut [f64]) {
+    ends.numbers(out, |_, side| strain_at(ends.model, &ends.past.still(&side.inputs), &side.config.x).energy);
+}
+pub(super) fn kinetic(ends: &Ends, out: &mut [f64]) {
+    let Some(inertia) = &ends.model.parts().inertia else { return out.fill(0.0) };
+    let v = ends.velocities();
+    out.fill(inertia.m.iter().zip(&ends.here.motion.v).zip(&v).map(|((m, v), dv)| m * v.dot(dv)).sum());
 }

@@ -40,7 +40,7 @@ pub(super) enum Cause {
 
 /// Positions of some free nodes as a function of q, eight nodes side by side.
 pub(super) struct Field {
-    nodes: Vec<u32>,
+    pub(super) nodes: Vec<u32>,
     /// Of each batch and coordinate: the offset, then the columns.
     values: Vec<[f64; BATCH]>,
 }

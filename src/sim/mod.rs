@@ -13,6 +13,7 @@ mod modal;
 mod model;
 mod modes;
 mod motion;
+mod outputs;
 mod pace;
 mod past;
 mod ports;
@@ -38,8 +39,10 @@ pub use step::StepReport;
 
 use std::sync::{Arc, OnceLock};
 
+use past::Origin;
+
 use crate::fem::Strain;
-use crate::solve::SolveError;
+pub use crate::solve::{Allowance, SolveError};
 
 /// Steps (s) outside of these make squares of dt overflow.
 const SHORTEST_STEP: f64 = 1e-100;
@@ -135,14 +138,20 @@ pub enum SimError {
         /// One past the last value asked for.
         end: usize,
     },
-    /// A state that belongs to another model.
-    #[error("the state belongs to another model: it has {found} nodes, this one {wanted}")]
-    ForeignState {
-        /// Nodes of the state.
-        found: usize,
-        /// Nodes of the model.
-        wanted: usize,
+    /// A state that belongs to another model, be it another material on the same mesh.
+    #[error(transparent)]
+    ForeignState(#[from] StateError),
+    /// A bound that leaves no work at all.
+    #[error("`{name}` was set to {value}; a step takes one linear solve at least")]
+    TooFew {
+        /// Port.
+        name: String,
+        /// What was found.
+        value: i32,
     },
+    /// A seed is NaN or infinite.
+    #[error("element {0} of the seed is not finite")]
+    SeedNotFinite(usize),
     /// A start that has not one position for each node.
     #[error("a start takes one position for each of the {wanted} nodes; found {found}")]
     StartLength {
@@ -197,9 +206,24 @@ impl Sim {
         Ok(Sim { model, state, work, strain: OnceLock::new(), whole: OnceLock::new(), sensitivity: None })
     }
 
+    /// Lives on this allowance from now on, as another simulation did before.
+    pub fn share(&mut self, allowance: &Arc<Allowance>) {
+        self.work.allowance.clone_from(allowance);
+    }
+
+    /// What cancels its steps from another thread: see [`Allowance::cancel`].
+    pub fn allowance(&self) -> &Arc<Allowance> {
+        &self.work.allowance
+    }
+
     /// The model it moves.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
+    }
+
+    /// Whether it stands at an accepted equilibrium or step.
+    pub fn is_settled(&self) -> bool {
+        self.state.outputs.converged
     }
 
     /// Simulation time, s.
@@ -219,7 +243,9 @@ impl Sim {
     pub fn initialise(&mut self) -> Result<StepReport, SimError> {
         let mut state = State::start(&self.model);
         state.t = self.state.t;
+        state.most_solves = self.state.most_solves;
         state.inputs.copy_from_slice(&self.state.inputs);
+        self.work.allowance.grant(state.most_solves);
         let report = step::initialise(&self.model, &mut state, &mut self.work)?;
         self.state = state;
         self.forget();
@@ -242,8 +268,8 @@ impl Sim {
 
     /// Advances by `dt` seconds; all or nothing.
     ///
-    /// A step spends about five times `solver.max_iterations` linear solves at most, however it is cut; with
-    /// `[inertia] accuracy` so does each of its pieces, of which there are 256 at most.
+    /// A step spends `solver.mostSolves` linear solves at most, however it is cut: unless the scene or the host says otherwise
+    /// five times `max_iterations`, with `[inertia] accuracy` for each of its pieces, of which there are 256 at most.
     ///
     /// # Errors
     /// [`SimError`]; the state is then the last accepted one, with the inputs as set.
@@ -251,6 +277,7 @@ impl Sim {
         if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
             return Err(SimError::StepLength(dt));
         }
+        self.work.allowance.grant(self.state.most_solves);
         let report = step::advance(&self.model, &mut self.state, &mut self.work, dt, None)?;
         self.forget();
         Ok(report)
@@ -269,6 +296,7 @@ impl Sim {
             let strain = || step::strain(&model, state, &state.config.x);
             watch(&View { model: &model, state, strain: &strain });
         };
+        self.work.allowance.grant(self.state.most_solves);
         let report = step::advance(&model, &mut self.state, &mut self.work, dt, Some(&mut piece))?;
         self.forget();
         watch(&self.view(&|| self.strain()));
@@ -293,6 +321,7 @@ impl Sim {
     pub fn save(&self) -> State {
         let mut state = self.state.clone();
         step::complete(&self.model, &mut state, &self.work);
+        self.work.keep(&self.model, &mut state);
         state
     }
 
@@ -301,10 +330,9 @@ impl Sim {
     /// # Errors
     /// [`SimError::ForeignState`].
     pub fn restore(&mut self, state: &State) -> Result<(), SimError> {
-        if !state.fits(&self.model) {
-            return Err(SimError::ForeignState { found: state.config.x.len(), wanted: self.model.mesh().nodes.len() });
-        }
+        state.belongs_to(&self.model)?;
         self.state.clone_from(state);
+        self.work.recall(&mut self.state);
         self.forget();
         Ok(())
     }
@@ -334,12 +362,14 @@ impl Sim {
         self.state.linearisation = None;
         self.state.motion.memory.fill([crate::math::Vec3::zeros(); 2]);
         self.state.motion.dt = 0.0;
+        self.work.kept.origin = Origin::Unknown;
         Ok(())
     }
 
     /// As after [`Sim::new`].
     pub fn reset(&mut self) {
         self.state = State::start(&self.model);
+        self.work.kept.origin = Origin::Unknown;
         self.forget();
     }
 

@@ -68,15 +68,6 @@ impl Coordinates {
         }
     }
 
-    /// Whether its lists are as long as those of `other`.
-    pub fn fits(&self, other: &Coordinates) -> bool {
-        let lengths = |c: &Coordinates| {
-            let Coordinates { p, v, memory, p_before, q, q_before, rate, pace } = c;
-            [p.len(), v.len(), memory.len(), p_before.len(), q.len(), q_before.len(), rate.len(), pace.len()]
-        };
-        lengths(self) == lengths(other)
-    }
-
     fn numbers(&self) -> impl Iterator<Item = &f64> {
         let vectors = self.p.iter().chain(&self.v).chain(self.memory.as_flattened()).chain(&self.p_before);
         let numbers = self.q.iter().chain(&self.q_before).chain(&self.rate).chain(&self.pace);
@@ -119,6 +110,11 @@ impl Last {
     pub fn none(model: &Model) -> Last {
         let still = Coordinates::still(model);
         Last { from: still.clone(), to: still, t: f64::NAN, dt: 0.0, dt_before: 0.0 }
+    }
+
+    /// The step from `from` that ended in `state`.
+    pub fn to(state: &State, from: Coordinates, dt: f64, dt_before: f64) -> Last {
+        Last { from, to: state.modal.clone(), t: state.t, dt, dt_before }
     }
 
     /// Whether it is how `state` came about.
@@ -291,10 +287,16 @@ pub(super) fn advance(
     state.modal.copy_from(&modal.next);
     state.config.poses.copy_from_slice(&modal.config.poses);
     modal.map.place_seen(model, &state.inputs, &modal.pivots, &mut state.config);
+    let seen = || modal.map.seen.nodes.iter().chain(modal.map.seen_on_bones.iter().map(|(_, _, a)| a));
+    seen().for_each(|&a| state.motion.a[a as usize] = state.motion.v[a as usize]);
     modal.map.seen.place(0.0, &modal.w, &mut state.motion.v);
     for &(bone, k, a) in &modal.map.seen_on_bones {
         let v = modal.velocity_on_bone(model, &state.modal.pace, &modal.pivots, bone as usize, k as usize);
         state.motion.v[a as usize] = v;
+    }
+    for &a in seen() {
+        let (a, v) = (&mut state.motion.a[a as usize], state.motion.v[a as usize]);
+        *a = if dt > 0.0 { (v - *a) / dt } else { Vec3::zeros() };
     }
     state.partial = true;
     warn_of_jumps(model, before, worst_jump(model, &state.config.x), &mut report);

@@ -1,8 +1,10 @@
 //! The immutable model: mesh, bones, terms, ports. Shared by all simulations of it.
 
+use std::sync::Arc;
+
 use sha2::{Digest, Sha256};
 
-use super::ports::{Layout, table};
+use super::ports::{Layout, Source, table};
 use super::scheme::Scheme;
 use super::skin::Skin;
 use crate::fem::{Assembly, At, Dofs, Elimination, Embedding, Term, Touch};
@@ -156,6 +158,8 @@ pub struct ModelParts {
     pub may_invert: bool,
     /// How the minimum is sought.
     pub strategy: Strategy,
+    /// Most linear solves of a step, until the host sets another bound.
+    pub most_solves: u32,
     /// Whether stale factors are replaced by ones that a second thread makes while steps go on.
     pub background: bool,
     /// Text that, with the mesh and the ports, identifies the model (the scene).
@@ -190,10 +194,11 @@ pub struct Unconstrained {
 pub struct Model {
     parts: ModelParts,
     ports: Vec<Port>,
+    sources: Vec<Source>,
     dofs: Dofs,
     skin: Skin,
     osteotomy: Vec<(u32, u32)>,
-    token: String,
+    token: Arc<str>,
 }
 
 impl Model {
@@ -213,7 +218,7 @@ impl Model {
             check_held(&parts, &dofs)?;
         }
         let skin = Skin::new(&parts.mesh, parts.embedding.take());
-        let ports = table(&parts, skin.len(), skin.triangles().len() / 3);
+        let (ports, sources) = table(&parts, skin.len(), skin.triangles().len() / 3);
         let osteotomy = osteotomy_edges(&parts.mesh, &parts.bones);
         if !osteotomy.is_empty() {
             parts.warnings.push(format!(
@@ -222,8 +227,8 @@ impl Model {
                 osteotomy.len()
             ));
         }
-        let token = token(&parts, &ports);
-        Ok(Model { parts, ports, dofs, skin, osteotomy, token })
+        let token = token(&parts, &ports).into();
+        Ok(Model { parts, ports, sources, dofs, skin, osteotomy, token })
     }
 
     /// The same without one rung of recovery, to measure what it buys.
@@ -258,6 +263,10 @@ impl Model {
     pub fn ports(&self) -> &[Port] {
         &self.ports
     }
+    /// Where the values of a port are.
+    pub(super) fn source(&self, port: usize) -> Source {
+        self.sources[port]
+    }
     /// What is unknown.
     pub fn dofs(&self) -> &Dofs {
         &self.dofs
@@ -287,9 +296,14 @@ impl Model {
     pub(super) fn osteotomy(&self) -> &[(u32, u32)] {
         &self.osteotomy
     }
-    /// Hash of ports, mesh and scene in braces: FMI's instantiation token.
+    /// Hash of ports, mesh and scene in braces: FMI's instantiation token. What stands in the scene for people or for its own
+    /// programme alone (comments, name, `[run]`, keyframes) is no part of it.
     pub fn token(&self) -> &str {
         &self.token
+    }
+    /// The token for states, which carry it without a copy.
+    pub(super) fn shared_token(&self) -> Arc<str> {
+        self.token.clone()
     }
     /// What the user should know about the model.
     pub fn warnings(&self) -> &[String] {
@@ -393,6 +407,7 @@ fn token(parts: &ModelParts, ports: &[Port]) -> String {
     let mesh = &parts.mesh;
     mesh.nodes.iter().flat_map(|x| x.iter()).for_each(|c| hash.update(c.to_le_bytes()));
     mesh.tets.as_flattened().iter().chain(&mesh.region).for_each(|i| hash.update(i.to_le_bytes()));
+    mesh.region_names.iter().for_each(|name| hash.update(format!("{name:?}")));
     parts.midsides.as_flattened().iter().for_each(|i| hash.update(i.to_le_bytes()));
     for set in &mesh.face_sets {
         hash.update(&set.name);

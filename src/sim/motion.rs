@@ -10,6 +10,8 @@ use crate::math::Vec3;
 pub(super) struct Motion {
     /// Nodal velocities, m/s.
     pub v: Vec<Vec3>,
+    /// Mean acceleration of each node over the last piece of time, m/s2; for hosts alone.
+    pub a: Vec<Vec3>,
     /// What the scheme remembers of each node; empty for backward Euler.
     pub memory: Vec<[Vec3; 2]>,
     /// Length of the last piece of time, s; 0 before the first.
@@ -25,20 +27,17 @@ impl Motion {
         let remembers = inertia.is_some_and(|i| i.scheme.remembers() && i.reduction.is_none());
         Motion {
             v: vec![Vec3::zeros(); if inertia.is_some() { n_nodes } else { 0 }],
+            a: vec![Vec3::zeros(); if inertia.is_some() { n_nodes } else { 0 }],
             memory: vec![[Vec3::zeros(); 2]; if remembers { n_nodes } else { 0 }],
             dt: 0.0,
             next_dt: 0.0,
         }
     }
 
-    /// Whether its lists are as long as those of `other`.
-    pub fn fits(&self, other: &Motion) -> bool {
-        self.v.len() == other.v.len() && self.memory.len() == other.memory.len()
-    }
-
     /// Overwrites itself with `other` without allocating.
     pub fn copy_from(&mut self, other: &Motion) {
         self.v.copy_from_slice(&other.v);
+        self.a.copy_from_slice(&other.a);
         self.memory.copy_from_slice(&other.memory);
         (self.dt, self.next_dt) = (other.dt, other.next_dt);
     }
@@ -46,6 +45,7 @@ impl Motion {
     /// Forgets all motion.
     pub fn halt(&mut self) {
         self.v.fill(Vec3::zeros());
+        self.a.fill(Vec3::zeros());
         self.memory.fill([Vec3::zeros(); 2]);
         (self.dt, self.next_dt) = (0.0, 0.0);
     }
@@ -75,6 +75,7 @@ impl Motion {
                 Role::Prescribed(_) => formula.arrive_with_bone(&past, &to.x[a]),
                 _ => formula.arrive(&past, &to.x[a]),
             };
+            self.a[a] = (v - self.v[a]) / dt;
             self.v[a] = v;
             if let Some(m) = self.memory.get_mut(a) {
                 *m = memory;

@@ -1,6 +1,7 @@
 //! The port table of a model, and where each input lies.
 
 use super::model::{Drive, Model, ModelParts};
+use super::outputs::{COMPUTED, Computed};
 use crate::port::{Causality, Port, Slot, Type};
 
 /// Where each settable port's values lie in the list of inputs.
@@ -75,342 +76,126 @@ impl Layout {
 /// Value reference of the first tunable tissue, and how many there may be.
 const FIRST_MATERIAL: u32 = 21;
 pub(crate) const MOST_TUNABLE: usize = 19;
-/// A modulus may fall to this part of the scene's; softer than that nothing is left of the tissue.
+/// Value reference of the displacements of the first bone.
+const FIRST_NODAL: u32 = 1000;
+/// A modulus may fall to this part of the scene's and rise to its inverse; softer than that nothing is left of the tissue.
 const SOFTEST: f64 = 1e-3;
+/// Beyond these (m, rad, N, N.m, Pa, m/s2) an input is a slip of units or a diverged controller, whatever the scene.
+const FARTHEST: f64 = 1e3;
+const MOST_TURNED: f64 = 1e2;
+const STRONGEST: f64 = 1e6;
+const MOST_PRESSED: f64 = 1e9;
+const HEAVIEST: f64 = 1e4;
 
-/// Value references; blocks are part of the ABI and never renumbered.
-fn reference(slot: Slot) -> u32 {
-    match slot {
-        Slot::Time => 0,
-        Slot::BoneTranslation => 10,
-        Slot::BoneRotation => 11,
-        Slot::BoneForce => 12,
-        Slot::BoneTorque => 13,
-        Slot::MuscleActivation => 14,
-        Slot::LoadForce => 15,
-        Slot::LoadPressure => 16,
-        Slot::MaterialE(k) => FIRST_MATERIAL + k,
-        Slot::Gravity => 50,
-        Slot::BonePivot => 51,
-        Slot::SkinPosition => 100,
-        Slot::SkinVelocity => 101,
-        Slot::MarkerPosition => 110,
-        Slot::BoneReactionForce => 120,
-        Slot::BoneReactionTorque => 121,
-        Slot::BonePoseTranslation => 122,
-        Slot::BonePoseRotation => 123,
-        Slot::ContactForce => 130,
-        Slot::ContactDepth => 131,
-        Slot::SolverIterations => 200,
-        Slot::SolverResidual => 201,
-        Slot::SolverConverged => 202,
-        Slot::EnergyElastic => 210,
-        Slot::EnergyKinetic => 211,
-        Slot::MinDetF => 220,
-        Slot::MaxStretch => 221,
-        Slot::SkinRestPosition => 300,
-        Slot::SkinTriangles => 301,
-        Slot::BoneNodal(bone) => 1000 + bone,
+/// Where the values of a port are.
+#[derive(Clone, Copy)]
+pub(super) enum Source {
+    /// Among the inputs, from here on.
+    Input(usize),
+    /// The state's bound on a step.
+    MostSolves,
+    /// Computed.
+    Computed(&'static Computed),
+}
+
+/// What is the same for all settable ports of one kind.
+struct Settable<'a> {
+    slot: Slot,
+    reference: u32,
+    name: &'a str,
+    shape: &'a [usize],
+    unit: &'static str,
+    causality: Causality,
+    nominal: f64,
+    range: [f64; 2],
+    rows: &'a [String],
+    description: &'a str,
+}
+
+impl Settable<'_> {
+    fn port(&self, start: Vec<f64>) -> Port {
+        let finite = |bound: f64| bound.is_finite().then_some(bound);
+        Port {
+            name: self.name.into(),
+            reference: self.reference,
+            slot: self.slot,
+            ty: Type::Float64,
+            single: self.slot == Slot::MuscleActivation,
+            shape: self.shape.to_vec(),
+            unit: self.unit,
+            causality: self.causality,
+            start,
+            nominal: self.nominal,
+            min: finite(self.range[0]),
+            max: finite(self.range[1]),
+            rows: self.rows.to_vec(),
+            description: self.description.into(),
+        }
     }
 }
 
-/// The ports of a model, ascending by value reference.
-pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> Vec<Port> {
+/// The ports of a model, ascending by value reference, and where the values of each are.
+pub(super) fn table(parts: &ModelParts, n_skin: usize, n_triangles: usize) -> (Vec<Port>, Vec<Source>) {
+    let mut all = inputs(parts);
+    all.push((most_solves(parts), Source::MostSolves));
+    all.extend(COMPUTED.iter().filter_map(|c| Some((c.port(parts, n_skin, n_triangles)?, Source::Computed(c)))));
+    all.sort_by_key(|(port, _)| port.reference);
+    all.into_iter().unzip()
+}
+
+/// One row a kind: what a host sets and terms read.
+#[rustfmt::skip] // one row a port
+fn inputs(parts: &ModelParts) -> Vec<(Port, Source)> {
+    use Causality::{Input, Parameter, TunableParameter};
+    use Slot::{BoneForce, BoneNodal, BonePivot, BoneRotation, BoneTorque, BoneTranslation, Gravity, LoadForce, LoadPressure, MaterialE, MuscleActivation};
     let bones: Vec<String> = parts.bones.iter().map(|b| b.name.clone()).collect();
-    let n = bones.len();
-    let layout = &parts.layout;
-    let dynamic = parts.inertia.is_some();
-    let any_force = parts.bones.iter().any(|b| b.drive == Drive::Force);
-    let mut ports = Vec::new();
-    let mut add = |slot, name: &str, ty, shape: &[usize], unit, causality, rows: &[String], description: &str| {
-        if shape.contains(&0) {
-            return;
-        }
-        let start = match (layout.first(slot), causality) {
-            (Some(first), Causality::Input | Causality::Parameter | Causality::TunableParameter) => {
-                parts.start[first..first + shape.iter().product::<usize>()].to_vec()
-            }
-            (None, Causality::Input | Causality::Parameter | Causality::TunableParameter) => return,
-            _ => Vec::new(),
-        };
-        let min = match slot {
-            Slot::MuscleActivation => Some(0.0),
-            Slot::MaterialE(_) => Some(SOFTEST * start[0]),
-            _ => None,
-        };
-        ports.push(Port {
-            name: name.into(),
-            reference: reference(slot),
-            slot,
-            ty,
-            shape: shape.to_vec(),
-            unit,
-            causality,
-            start,
-            single: slot == Slot::MuscleActivation,
-            min,
-            max: (slot == Slot::MuscleActivation).then_some(1.0),
-            rows: rows.to_vec(),
-            description: description.into(),
-        });
+    let (n, n_muscles, n_loads, n_pressures) = (bones.len(), parts.muscles.len(), parts.loads.len(), parts.pressures.len());
+    let mut all = Vec::new();
+    let mut add = |row: Settable| {
+        let Some(first) = parts.layout.first(row.slot) else { return };
+        all.push((row.port(parts.start[first..first + row.shape.iter().product::<usize>()].to_vec()), Source::Input(first)));
     };
-    use Causality::{CalculatedParameter, Independent, Input, Output, Parameter, TunableParameter};
-    use Type::{Boolean, Float64, Int32};
-    let no = &[][..];
-    add(Slot::Time, "time", Float64, no, "s", Independent, no_rows(), "Simulation time");
-    add(
-        Slot::BoneTranslation,
-        "bone.translation",
-        Float64,
-        &[n, 3],
-        "m",
-        Input,
-        &bones,
-        "Translation of each pose-driven bone's pivot from rest",
-    );
-    add(
-        Slot::BoneRotation,
-        "bone.rotation",
-        Float64,
-        &[n, 3],
-        "rad",
-        Input,
-        &bones,
-        "Rotation vector (axis times angle) of each pose-driven bone from rest, about its pivot",
-    );
-    add(
-        Slot::BoneForce,
-        "bone.force",
-        Float64,
-        &[n, 3],
-        "N",
-        Input,
-        &bones,
-        "Force on each force-driven bone, at its pivot",
-    );
-    add(
-        Slot::BoneTorque,
-        "bone.torque",
-        Float64,
-        &[n, 3],
-        "N.m",
-        Input,
-        &bones,
-        "Torque on each force-driven bone, about its pivot",
-    );
-    add(
-        Slot::MuscleActivation,
-        "muscle.activation",
-        Float64,
-        &[parts.muscles.len()],
-        "1",
-        Input,
-        &parts.muscles,
-        "Activation of each muscle, from 0 (slack) to 1 (full stress)",
-    );
-    add(
-        Slot::LoadForce,
-        "load.force",
-        Float64,
-        &[parts.loads.len(), 3],
-        "N",
-        Input,
-        &parts.loads,
-        "Total force of each load",
-    );
-    add(
-        Slot::LoadPressure,
-        "load.pressure",
-        Float64,
-        &[parts.pressures.len()],
-        "Pa",
-        Input,
-        &parts.pressures,
-        "Pressure of each pressure load; positive pushes into the tissue and follows the surface",
-    );
+    let within = |most: f64| [-most, most];
+    let none = &[][..];
+    add(Settable { slot: BoneTranslation, reference: 10, name: "bone.translation", shape: &[n, 3], unit: "m", causality: Input, nominal: 0.01, range: within(FARTHEST), rows: &bones, description: "Translation of each pose-driven bone's pivot from rest; zero for other bones" });
+    add(Settable { slot: BoneRotation, reference: 11, name: "bone.rotation", shape: &[n, 3], unit: "rad", causality: Input, nominal: 0.1, range: within(MOST_TURNED), rows: &bones, description: "Rotation vector (axis times angle) of each pose-driven bone from rest, about its pivot; zero for other bones" });
+    add(Settable { slot: BoneForce, reference: 12, name: "bone.force", shape: &[n, 3], unit: "N", causality: Input, nominal: 1.0, range: within(STRONGEST), rows: &bones, description: "Force on each force-driven bone, at its pivot; zero for other bones" });
+    add(Settable { slot: BoneTorque, reference: 13, name: "bone.torque", shape: &[n, 3], unit: "N.m", causality: Input, nominal: 0.01, range: within(STRONGEST), rows: &bones, description: "Torque on each force-driven bone, about its pivot; zero for other bones" });
+    add(Settable { slot: MuscleActivation, reference: 14, name: "muscle.activation", shape: &[n_muscles], unit: "1", causality: Input, nominal: 1.0, range: [0.0, 1.0], rows: &parts.muscles, description: "Activation of each muscle, from 0 (slack) to 1 (full stress)" });
+    add(Settable { slot: LoadForce, reference: 15, name: "load.force", shape: &[n_loads, 3], unit: "N", causality: Input, nominal: 1.0, range: within(STRONGEST), rows: &parts.loads, description: "Total force of each load" });
+    add(Settable { slot: LoadPressure, reference: 16, name: "load.pressure", shape: &[n_pressures], unit: "Pa", causality: Input, nominal: 1e3, range: within(MOST_PRESSED), rows: &parts.pressures, description: "Pressure of each pressure load; positive pushes into the tissue and follows the surface" });
     for (k, tissue) in parts.tunable.iter().enumerate() {
         let name = format!("material.{tissue}.E");
         let text = format!("Young's modulus of tissue {tissue} at small strain; all its moduli follow in proportion");
-        add(Slot::MaterialE(k as u32), &name, Float64, no, "Pa", TunableParameter, no_rows(), &text);
+        let start = parts.start[k];
+        add(Settable { slot: MaterialE(k as u32), reference: FIRST_MATERIAL + k as u32, name: &name, shape: none, unit: "Pa", causality: TunableParameter, nominal: 1e4, range: [SOFTEST * start, start / SOFTEST], rows: no_rows(), description: &text });
     }
-    add(Slot::Gravity, "gravity", Float64, &[3], "m/s2", Parameter, no_rows(), "Acceleration of gravity");
-    add(Slot::BonePivot, "bone.pivot", Float64, &[n, 3], "m", Parameter, &bones, "Rest position of each bone's pivot");
-    add(
-        Slot::SkinPosition,
-        "skin.position",
-        Float64,
-        &[n_skin, 3],
-        "m",
-        Output,
-        no_rows(),
-        "Position of each skin vertex",
-    );
-    if dynamic {
-        add(
-            Slot::SkinVelocity,
-            "skin.velocity",
-            Float64,
-            &[n_skin, 3],
-            "m/s",
-            Output,
-            no_rows(),
-            "Velocity of each skin vertex",
-        );
-    }
-    let markers: Vec<String> = parts.markers.iter().map(|m| m.name.clone()).collect();
-    add(
-        Slot::MarkerPosition,
-        "marker.position",
-        Float64,
-        &[markers.len(), 3],
-        "m",
-        Output,
-        &markers,
-        "Position of each marker on the skin",
-    );
-    add(
-        Slot::BoneReactionForce,
-        "bone.reactionForce",
-        Float64,
-        &[n, 3],
-        "N",
-        Output,
-        &bones,
-        "Force that the tissue exerts on each bone",
-    );
-    add(
-        Slot::BoneReactionTorque,
-        "bone.reactionTorque",
-        Float64,
-        &[n, 3],
-        "N.m",
-        Output,
-        &bones,
-        "Torque that the tissue exerts on each bone, about its current pivot",
-    );
-    if any_force {
-        add(
-            Slot::BonePoseTranslation,
-            "bone.poseTranslation",
-            Float64,
-            &[n, 3],
-            "m",
-            Output,
-            &bones,
-            "Translation each bone's pivot has reached",
-        );
-        add(
-            Slot::BonePoseRotation,
-            "bone.poseRotation",
-            Float64,
-            &[n, 3],
-            "rad",
-            Output,
-            &bones,
-            "Rotation vector each bone has reached",
-        );
-    }
-    let contacts: Vec<String> = parts.contacts.iter().map(|c| c.name.clone()).collect();
-    add(
-        Slot::ContactForce,
-        "contact.force",
-        Float64,
-        &[contacts.len(), 3],
-        "N",
-        Output,
-        &contacts,
-        "Force that the tissue exerts on each contact's shape; part of the reaction of its bone",
-    );
-    add(
-        Slot::ContactDepth,
-        "contact.depth",
-        Float64,
-        &[contacts.len()],
-        "m",
-        Output,
-        &contacts,
-        "How deep the tissue lies in each contact's shape at most",
-    );
-    add(
-        Slot::SolverIterations,
-        "solver.iterations",
-        Int32,
-        no,
-        "1",
-        Output,
-        no_rows(),
-        "Linear solves of the last step",
-    );
-    add(
-        Slot::SolverResidual,
-        "solver.residual",
-        Float64,
-        no,
-        "N",
-        Output,
-        no_rows(),
-        "Norm of the force residual after the last step",
-    );
-    add(
-        Slot::SolverConverged,
-        "solver.converged",
-        Boolean,
-        no,
-        "1",
-        Output,
-        no_rows(),
-        "Whether the last step met its tolerance",
-    );
-    add(Slot::EnergyElastic, "energy.elastic", Float64, no, "J", Output, no_rows(), "Strain energy of the tissue");
-    if dynamic {
-        add(Slot::EnergyKinetic, "energy.kinetic", Float64, no, "J", Output, no_rows(), "Kinetic energy of the tissue");
-    }
-    add(
-        Slot::MinDetF,
-        "quality.minDetF",
-        Float64,
-        no,
-        "1",
-        Output,
-        no_rows(),
-        "Smallest ratio of current to rest volume of any element",
-    );
-    add(
-        Slot::MaxStretch,
-        "quality.maxStretch",
-        Float64,
-        no,
-        "1",
-        Output,
-        no_rows(),
-        "Largest principal stretch of any element",
-    );
-    add(
-        Slot::SkinRestPosition,
-        "skin.restPosition",
-        Float64,
-        &[n_skin, 3],
-        "m",
-        CalculatedParameter,
-        no_rows(),
-        "Rest position of each skin vertex",
-    );
-    add(
-        Slot::SkinTriangles,
-        "skin.triangles",
-        Int32,
-        &[n_triangles, 3],
-        "1",
-        CalculatedParameter,
-        no_rows(),
-        "Skin triangles as 0-based rows of skin.position, wound outward",
-    );
+    add(Settable { slot: Gravity, reference: 50, name: "gravity", shape: &[3], unit: "m/s2", causality: TunableParameter, nominal: 10.0, range: within(HEAVIEST), rows: no_rows(), description: "Acceleration of gravity" });
+    add(Settable { slot: BonePivot, reference: 51, name: "bone.pivot", shape: &[n, 3], unit: "m", causality: Parameter, nominal: 0.1, range: within(FARTHEST), rows: &bones, description: "Rest position of each bone's pivot" });
     for (b, bone) in parts.bones.iter().enumerate() {
         let name = format!("bone.{}.displacement", bone.name);
         let text = format!("Displacement of each node of bone {}, in the order of its node set", bone.name);
-        add(Slot::BoneNodal(b as u32), &name, Float64, &[bone.nodes.len(), 3], "m", Input, no_rows(), &text);
+        add(Settable { slot: BoneNodal(b as u32), reference: FIRST_NODAL + b as u32, name: &name, shape: &[bone.nodes.len(), 3], unit: "m", causality: Input, nominal: 0.01, range: within(FARTHEST), rows: no_rows(), description: &text });
     }
-    ports
+    all
+}
+
+/// The bound on a step, which is no input of the tissue.
+fn most_solves(parts: &ModelParts) -> Port {
+    let row = Settable {
+        slot: Slot::MostSolves,
+        reference: 40,
+        name: "solver.mostSolves",
+        shape: &[],
+        unit: "1",
+        causality: Causality::TunableParameter,
+        nominal: 1e3,
+        range: [1.0, f64::from(i32::MAX)],
+        rows: no_rows(),
+        description: "Linear solves that a step may take at most; one that would take more is discarded",
+    };
+    let start = f64::from(i32::try_from(parts.most_solves).unwrap_or(i32::MAX));
+    Port { ty: Type::Int32, ..row.port(vec![start]) }
 }
 
 fn no_rows() -> &'static [String] {

@@ -7,10 +7,12 @@
 //! Source: Irving, Teran & Fedkiw, "Invertible finite elements for robust simulation of large deformation", SCA 2004, for
 //! the rotation that inverted elements are given.
 
+use std::sync::Arc;
+
 use super::model::Model;
 use crate::fem::{At, Configuration};
 use crate::math::Vec3;
-use crate::solve::{LinearSystems, Minimiser, Outcome, Precision, Problem, SolveError, Strategy};
+use crate::solve::{Allowance, LinearSystems, Minimiser, Outcome, Precision, Problem, SolveError, Strategy};
 
 /// The stand-in only has to untangle, so it is solved coarsely: share of the model's size that the last correction may be.
 const COARSE: f64 = 1e-4;
@@ -27,7 +29,12 @@ const STRATEGY: Strategy = Strategy {
 };
 
 /// Moves the free nodes of `config` to the equilibrium of the stand-in. Allocates: this is no common step.
-pub(super) fn untangle(model: &Model, pivots: &[Vec3], config: &mut Configuration) -> Result<Outcome, SolveError> {
+pub(super) fn untangle(
+    model: &Model,
+    pivots: &[Vec3],
+    allowance: &Arc<Allowance>,
+    config: &mut Configuration,
+) -> Result<Outcome, SolveError> {
     let parts = model.parts();
     let X = &parts.mesh.nodes;
     let terms = (parts.stand_in)(&parts.mesh, &parts.midsides);
@@ -36,6 +43,7 @@ pub(super) fn untangle(model: &Model, pivots: &[Vec3], config: &mut Configuratio
     let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
     let strategy = Strategy { tolerance: COARSE * (high - low).norm(), ..STRATEGY };
     let mut minimiser = Minimiser::new(&problem, strategy)?;
+    minimiser.share(allowance);
     let rest = Configuration { x: X.clone(), poses: config.poses.clone() };
     minimiser.linearise(&problem, &rest)?;
     minimiser.minimise(&problem, config)

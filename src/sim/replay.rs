@@ -3,11 +3,11 @@
 //! The step is affine in all inputs but turns, so central differences are good to nine digits; the adjoint asks for one input
 //! after another.
 
-use super::derivative::{check_settled, mismatch};
 use super::modal::{self, Last};
-use super::step::Workspace;
+use super::modes::Modal;
+use super::past::unknown;
+use super::step::{Workspace, complete, strain};
 use super::{Model, Sim, SimError, State, View};
-use crate::fem::Strain;
 
 /// Largest change of an input in a difference, in its SI unit.
 const CHANGE: f64 = 1e-5;
@@ -20,13 +20,6 @@ impl Sim {
         unknowns: &[usize],
         sensitivity: &mut [f64],
     ) -> Result<(), SimError> {
-        let mut n = 0;
-        for &unknown in unknowns {
-            n += self.unknown(unknown)?.len();
-        }
-        if n != sensitivity.len() {
-            return Err(mismatch("sensitivity", n, sensitivity));
-        }
         let scale = direction.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         sensitivity.fill(0.0);
         if scale == 0.0 {
@@ -37,7 +30,12 @@ impl Sim {
         for side in [1.0, -1.0] {
             let moved = self.state.applied.iter().zip(direction).map(|(value, d)| value + side * h * d).collect();
             let state = again(&self.model, &self.state, &mut self.work, moved)?;
-            let view = View { model: &self.model, state: &state, strain: &|| Strain::NONE };
+            let strain = || {
+                let mut whole = state.clone();
+                complete(&self.model, &mut whole, &self.work);
+                strain(&self.model, &whole, &whole.config.x)
+            };
+            let view = View { model: &self.model, state: &state, strain: &strain };
             let mut left = &mut values[..];
             for &unknown in unknowns {
                 let (now, later) = left.split_at_mut(self.model.ports()[unknown].len());
@@ -72,13 +70,15 @@ impl Sim {
 /// The state that the last step would have led to from the same past under other inputs.
 fn again(model: &Model, state: &State, work: &mut Workspace, inputs: Vec<f64>) -> Result<State, SimError> {
     let refused = |why: &str| Err(SimError::NoDerivative(why.into()));
-    check_settled(state)?;
+    let recalled = work.kept.modal.take_if(|last| last.led_to(state));
     let (minimiser, modal) = work.modal();
-    let Some(made) = modal.as_mut().filter(|modal| modal.last.led_to(state)) else {
-        return refused(
-            "what came before this state is not known any more: make a step, or set out from an equilibrium",
-        );
-    };
+    if let Some(last) = recalled {
+        if !modal.as_ref().is_some_and(|modal| modal.map.serves(&state.applied)) {
+            *modal = Some(Box::new(Modal::new(model, minimiser, &state.applied)?.0));
+        }
+        modal.as_mut().expect("made above").last = last;
+    }
+    let made = modal.as_mut().filter(|modal| modal.last.led_to(state)).ok_or_else(unknown)?;
     if !made.map.serves(&inputs) {
         return refused(
             "moduli and pivots change the modes themselves: ask for no derivatives by them, or leave `modes` out",

@@ -8,6 +8,7 @@ use super::linearisation::Linearisation;
 use super::modal::Coordinates;
 use super::model::Model;
 use super::motion::Motion;
+use super::past::Before;
 use crate::bytes::{Reader, Truncated, Writer};
 use crate::fem::Configuration;
 use crate::math::{Mat3, Pose, Vec3};
@@ -36,6 +37,8 @@ pub(super) struct Outputs {
 /// A snapshot of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
+    /// Token of the model that it is a state of.
+    model: Arc<str>,
     pub(super) t: f64,
     pub(super) config: Configuration,
     /// Whether only the nodes that ports read are where they belong; never so in a snapshot.
@@ -54,6 +57,10 @@ pub struct State {
     /// Never there without `[solver] background`.
     pub(super) upcoming: Option<Upcoming>,
     pub(super) outputs: Outputs,
+    /// Most linear solves of a step, as the host set it last.
+    pub(super) most_solves: u32,
+    /// What came before the last step, for its derivatives; in snapshots of scenes that remember, nowhere else.
+    pub(super) before: Option<Arc<Before>>,
 }
 
 /// Why bytes are no state of this model.
@@ -100,7 +107,7 @@ pub enum StateError {
 }
 
 const MAGIC: &[u8; 8] = b"cutis-st";
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 
 impl State {
     /// At rest, t = 0, inputs at their start values.
@@ -108,6 +115,7 @@ impl State {
         let parts = model.parts();
         let n = parts.bones.len();
         State {
+            model: model.shared_token(),
             t: 0.0,
             config: Configuration { x: parts.mesh.nodes.clone(), poses: vec![Pose::REST; n] },
             partial: false,
@@ -127,18 +135,20 @@ impl State {
                 kinetic: 0.0,
                 dt: 0.0,
             },
+            most_solves: parts.most_solves,
+            before: None,
         }
     }
 
-    /// Whether its lists have the lengths of the model.
-    pub(super) fn fits(&self, model: &Model) -> bool {
-        let parts = model.parts();
-        self.config.x.len() == parts.mesh.nodes.len()
-            && self.config.poses.len() == parts.bones.len()
-            && self.inputs.len() == parts.layout.len()
-            && self.history.len() == parts.n_history
-            && self.motion.fits(&Motion::still(parts.mesh.nodes.len(), parts.inertia.as_ref()))
-            && self.modal.fits(&Coordinates::still(model))
+    /// Whether it is a state of this model: of no other mesh, and of no other material on the same mesh.
+    ///
+    /// # Errors
+    /// [`StateError::Model`].
+    pub fn belongs_to(&self, model: &Model) -> Result<(), StateError> {
+        if *self.model == *model.token() {
+            return Ok(());
+        }
+        Err(StateError::Model { found: self.model.to_string(), wanted: model.token().into() })
     }
 
     /// Whether all that steps make is; inputs are the host's, who may have set anything.
@@ -150,20 +160,22 @@ impl State {
         let made = |l: &Linearisation| {
             config(&l.config) && l.x_tilde.iter().flatten().chain(&l.inputs).chain(&l.history).all(|v| v.is_finite())
         };
-        let moving = self.motion.v.iter().chain(self.motion.memory.as_flattened()).flatten();
+        let moving = self.motion.v.iter().chain(&self.motion.a).chain(self.motion.memory.as_flattened()).flatten();
         config(&self.config)
             && self.modal.is_finite()
             && moving.chain(&self.history).chain(&self.applied).all(|v| v.is_finite())
+            && self.before.as_ref().is_none_or(|before| before.is_finite())
             && self.linearisation.iter().chain(self.upcoming.iter().map(|u| &u.linearisation)).all(|l| made(l))
     }
 
-    /// Versioned, checksummed little-endian bytes; readable in another process with the same model.
+    /// Versioned, checksummed little-endian bytes; readable in another process with the same model, to which it must belong.
     pub fn to_bytes(&self, model: &Model) -> Vec<u8> {
         let mut body = Writer::default();
-        body.text(model.token());
+        body.text(&self.model);
         body.f64(self.t);
         put_config(&mut body, &self.config);
         put_vectors(&mut body, &self.motion.v);
+        put_vectors(&mut body, &self.motion.a);
         put_vectors(&mut body, self.motion.memory.as_flattened());
         body.f64(self.motion.dt);
         body.f64(self.motion.next_dt);
@@ -187,6 +199,11 @@ impl State {
         if let Some(upcoming) = &self.upcoming {
             put_linearisation(&mut body, &upcoming.linearisation);
             body.u32(upcoming.solves);
+        }
+        body.u32(self.most_solves);
+        body.u32(u32::from(self.before.is_some()));
+        if let Some(before) = &self.before {
+            put_before(&mut body, before);
         }
         let mut out = Writer::default();
         out.raw(MAGIC);
@@ -226,7 +243,8 @@ impl State {
         let t = r.f64()?;
         let config = take_config(&mut r, n, n_bones)?;
         let motion = take_motion(&mut r, &Motion::still(n, parts.inertia.as_ref()))?;
-        let modal = take_coordinates(&mut r, Coordinates::still(model), model.is_reduced())?;
+        let still = Coordinates::still(model);
+        let modal = if model.is_reduced() { take_coordinates(&mut r, &still)? } else { still };
         let history = take_f64s(&mut r, "remembered values", parts.n_history)?;
         let inputs = take_f64s(&mut r, "inputs", n_inputs)?;
         let applied = take_f64s(&mut r, "inputs", n_inputs)?;
@@ -242,8 +260,14 @@ impl State {
             0 => None,
             _ => Some(Upcoming { linearisation: Arc::new(take_linearisation(&mut r, model)?), solves: r.u32()? }),
         };
+        let most_solves = r.u32()?;
+        let before = match r.u32()? {
+            0 => None,
+            _ => Some(Arc::new(take_before(&mut r, model)?)),
+        };
         let outputs = Outputs { reaction_force, reaction_torque, iterations, residual, converged, kinetic, dt };
         let state = State {
+            model: model.shared_token(),
             t,
             config,
             partial: false,
@@ -255,6 +279,8 @@ impl State {
             linearisation,
             upcoming,
             outputs,
+            most_solves,
+            before,
         };
         if state.is_finite() { Ok(state) } else { Err(StateError::NotFinite) }
     }
@@ -326,16 +352,14 @@ fn take_vectors(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec
 
 fn take_motion(r: &mut Reader, like: &Motion) -> Result<Motion, StateError> {
     let v = take_vectors(r, "velocities", like.v.len())?;
+    let a = take_vectors(r, "accelerations", like.a.len())?;
     let memory = take_vectors(r, "remembered motions", 2 * like.memory.len())?;
     let memory = memory.chunks_exact(2).map(|m| [m[0], m[1]]).collect();
-    Ok(Motion { v, memory, dt: r.f64()?, next_dt: r.f64()? })
+    Ok(Motion { v, a, memory, dt: r.f64()?, next_dt: r.f64()? })
 }
 
 /// Those of scenes in modes; other scenes write none.
-fn take_coordinates(r: &mut Reader, like: Coordinates, written: bool) -> Result<Coordinates, StateError> {
-    if !written {
-        return Ok(like);
-    }
+fn take_coordinates(r: &mut Reader, like: &Coordinates) -> Result<Coordinates, StateError> {
     let (n, n_causes) = (like.p.len(), like.q.len());
     let mut vectors = |n: usize| take_vectors(r, "modal coordinates", n);
     let (p, v, memory, p_before) = (vectors(n)?, vectors(n)?, vectors(2 * n)?, vectors(n)?);
@@ -343,6 +367,37 @@ fn take_coordinates(r: &mut Reader, like: Coordinates, written: bool) -> Result<
     let mut numbers = || take_f64s(r, "causes", n_causes);
     let (q, q_before, rate, pace) = (numbers()?, numbers()?, numbers()?, numbers()?);
     Ok(Coordinates { p, v, memory, p_before, q, q_before, rate, pace })
+}
+
+fn put_before(w: &mut Writer, before: &Before) {
+    let Before { at_rest, dt, dt_before, history, x_tilde, from } = before;
+    w.u32(u32::from(*at_rest));
+    [*dt, *dt_before].into_iter().for_each(|v| w.f64(v));
+    w.f64s(history.iter().copied());
+    put_vectors(w, x_tilde);
+    w.u32(u32::from(from.is_some()));
+    if let Some(from) = from {
+        put_coordinates(w, from);
+    }
+}
+
+fn take_before(r: &mut Reader, model: &Model) -> Result<Before, StateError> {
+    let parts = model.parts();
+    Ok(Before {
+        at_rest: r.u32()? != 0,
+        dt: r.f64()?,
+        dt_before: r.f64()?,
+        history: take_f64s(r, "remembered values", parts.n_history)?,
+        x_tilde: take_vectors(
+            r,
+            "inertial predictions",
+            if parts.inertia.is_some() { parts.mesh.nodes.len() } else { 0 },
+        )?,
+        from: match r.u32()? {
+            0 => None,
+            _ => Some(take_coordinates(r, &Coordinates::still(model))?),
+        },
+    })
 }
 
 fn take_f64s(r: &mut Reader, what: &'static str, wanted: usize) -> Result<Vec<f64>, StateError> {

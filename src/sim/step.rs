@@ -14,6 +14,7 @@ use super::model::{Drive, Model};
 use super::modes::{Modal, Spectrum};
 use super::motion::Motion;
 use super::pace::{Pace, even_part};
+use super::past::{Kept, Origin};
 use super::recover::untangle;
 use super::scheme::Scheme;
 use super::start::accelerations;
@@ -22,7 +23,7 @@ use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
 use crate::math::{Mat3, Pose, Vec3, best_fit};
 use crate::port::Slot;
-use crate::solve::{Minimiser, Outcome, Problem, Rung};
+use crate::solve::{Allowance, Minimiser, Outcome, Problem, Rung};
 
 /// A step is cut into pieces no smaller than this part of it.
 const SMALLEST_PIECE: f64 = 1.0 / 64.0;
@@ -69,6 +70,8 @@ pub struct StepReport {
 /// Scratch of the solver; never saved. Allocates when made, then no more.
 pub(super) struct Workspace {
     minimiser: Box<Minimiser>,
+    /// What its steps may spend.
+    pub allowance: Arc<Allowance>,
     /// The answer to every input, in scenes that are linear in them.
     table: Table,
     /// The same with modes of vibration, in scenes that ask for them.
@@ -85,8 +88,8 @@ pub(super) struct Workspace {
     time_error: f64,
     /// The last accepted piece of time; its end is in `config`, what it remembered from before in `remembered`.
     last: Option<Piece>,
-    /// Accepted pieces so far.
-    n_pieces: u64,
+    /// How the accepted state came about.
+    pub kept: Kept,
     /// What terms remember, and where the next memory is written.
     history: Vec<f64>,
     remembered: Vec<f64>,
@@ -100,7 +103,7 @@ pub(super) struct Workspace {
 /// A piece of time that was accepted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
-    /// Its number, counted from the first of the workspace.
+    /// Its number among those that were kept; 0 before.
     pub number: u64,
     /// Its end, s.
     pub t: f64,
@@ -135,6 +138,7 @@ impl Workspace {
         };
         Ok(Workspace {
             minimiser: Box::new(Minimiser::new(&problem, parts.strategy)?),
+            allowance: Arc::default(),
             table: Table::Unknown,
             modal: None,
             factored: None,
@@ -144,7 +148,7 @@ impl Workspace {
             motion: Motion::still(X.len(), parts.inertia.as_ref()),
             time_error: 0.0,
             last: None,
-            n_pieces: 0,
+            kept: Kept::new(parts.n_history, if parts.inertia.is_some() { X.len() } else { 0 }),
             history: vec![0.0; parts.n_history],
             remembered: vec![0.0; parts.n_history],
             inputs: parts.start.clone(),
@@ -164,14 +168,15 @@ impl Workspace {
         (&mut self.minimiser, &mut self.modal)
     }
 
-    /// The piece of time that led to `state`, if that was the last one here.
-    pub fn piece_to(&self, state: &State) -> Option<Piece> {
-        self.last.filter(|piece| piece.t == state.t && self.config == state.config)
+    /// Completes a snapshot of `state` by what came before it.
+    pub fn keep(&self, model: &Model, state: &mut State) {
+        state.before = self.kept.save(model, state, self.modal.as_ref().map(|modal| &modal.last));
     }
 
-    /// What terms remembered before the last piece, and where inertia alone would have carried the nodes in it.
-    pub fn before_last(&self) -> (&[f64], &[Vec3]) {
-        (&self.remembered, &self.x_tilde)
+    /// Takes over what a snapshot knows of what came before it.
+    pub fn recall(&mut self, state: &mut State) {
+        self.kept.restore(state);
+        state.before = None;
     }
 }
 
@@ -181,7 +186,6 @@ pub(super) fn initialise(model: &Arc<Model>, state: &mut State, work: &mut Works
         check_inputs(model, &state.inputs)?;
         read_pivots(model, &state.inputs, &mut work.pivots);
         work.inputs.copy_from_slice(&state.inputs);
-        work.last = None;
         place_bones(model, &work.inputs, &mut work.config);
         if let Some(bone) = (0..model.parts().bones.len()).find(|&b| work.config.poses[b] != Pose::REST) {
             return Err(SimError::NotAtRest(model.parts().bones[bone].name.clone()));
@@ -189,6 +193,7 @@ pub(super) fn initialise(model: &Arc<Model>, state: &mut State, work: &mut Works
         state.applied.copy_from_slice(&state.inputs);
         state.outputs.converged = true;
         set_off(model, state, work)?;
+        work.kept.origin = Origin::Rest;
         return Ok(StepReport::new(0));
     }
     let report = advance(model, state, work, 0.0, None)?;
@@ -203,7 +208,7 @@ fn set_off(model: &Model, state: &mut State, work: &mut Workspace) -> Result<(),
         return modal::set_off(model, state, &mut work.minimiser, &mut work.modal);
     }
     let parts = model.parts();
-    let Some(inertia) = parts.inertia.as_ref().filter(|i| matches!(i.scheme, Scheme::GeneralisedAlpha { .. })) else {
+    let Some(inertia) = parts.inertia.as_ref() else {
         return Ok(());
     };
     read_wrenches(model, &state.inputs, &mut work.wrenches);
@@ -211,8 +216,10 @@ fn set_off(model: &Model, state: &mut State, work: &mut Workspace) -> Result<(),
     history.copy_from_slice(&state.history);
     let at = At { t: state.t, inputs, history, x_tilde: &parts.mesh.nodes, ..At::NOWHERE };
     let problem = Problem { terms: &parts.terms, dofs: model.dofs(), X: &parts.mesh.nodes, pivots, wrenches, at };
-    let a = accelerations(&problem, &state.config, &inertia.m);
-    state.motion.memory.iter_mut().zip(a).for_each(|(memory, a)| memory[0] = a);
+    state.motion.a = accelerations(&problem, &state.config, &inertia.m);
+    if matches!(inertia.scheme, Scheme::GeneralisedAlpha { .. }) {
+        state.motion.memory.iter_mut().zip(&state.motion.a).for_each(|(memory, a)| memory[0] = *a);
+    }
     Ok(())
 }
 
@@ -232,6 +239,7 @@ pub(super) fn advance(
         return Ok(report);
     }
     if let Some(report) = modal::advance(model, state, &mut work.minimiser, &mut work.modal, dt)? {
+        work.kept.origin = Origin::Unknown; // tables of modes know it themselves
         return Ok(report);
     }
     read_pivots(model, &state.inputs, &mut work.pivots);
@@ -240,6 +248,7 @@ pub(super) fn advance(
     work.history.copy_from_slice(&state.history);
     let mut report = StepReport::new(0);
     let taken_up = work.ahead.take_up(model, state, &mut work.minimiser, &mut work.factored);
+    work.minimiser.share(&work.allowance);
     report.factorisations += u32::from(taken_up.is_some());
     let mut linearisation = taken_up.or_else(|| state.linearisation.clone());
     let pace = Pace::of(model.parts().inertia.as_ref()).filter(|_| dt > 0.0);
@@ -294,7 +303,8 @@ pub(super) fn advance(
                 piece = 0.5 * (to - done);
                 report.iterations += source.iterations();
                 let spent = report.iterations - spent_before;
-                if piece < smallest
+                if source.is_final()
+                    || piece < smallest
                     || !model.parts().strategy.has(Rung::Pieces)
                     || spent > BUDGET * model.parts().strategy.max_iterations
                 {
@@ -319,7 +329,10 @@ pub(super) fn advance(
     accept(model, state, work, &report, dt);
     state.linearisation = linearisation;
     let piece = work.last.expect("the step had a last piece");
-    let Workspace { ahead, minimiser, config, inputs, remembered, x_tilde, .. } = work;
+    let Workspace { ahead, minimiser, config, inputs, remembered, x_tilde, kept, .. } = work;
+    if model.remembers() {
+        kept.take(&piece, remembered, x_tilde);
+    }
     let at = At { t: piece.t, dt: piece.dt, inputs, history: remembered, x_tilde, ..At::NOWHERE };
     let end = || Linearisation::new(config, &at, piece.dt_before);
     state.upcoming = ahead.look(model, state.upcoming.take(), &report, minimiser, end);
@@ -486,7 +499,6 @@ fn step_piece(
         motion,
         time_error,
         last,
-        n_pieces,
         history,
         remembered,
         inputs,
@@ -504,7 +516,7 @@ fn step_piece(
         linearisation.is_none() && !model.is_quadratic() && strategy.has(Rung::StandIn) && is_inverted(&config.x);
     let mut still_tangled = false;
     if untangled {
-        let outcome = untangle(model, pivots, config)?;
+        let outcome = untangle(model, pivots, minimiser.allowance(), config)?;
         report.iterations += outcome.iterations;
         report.factorisations += outcome.factorisations;
         still_tangled = is_inverted(&config.x);
@@ -568,8 +580,7 @@ fn step_piece(
         parts.terms.iter().filter(|t| t.remembers()).for_each(|t| t.commit(&at, &config.x, remembered));
         std::mem::swap(history, remembered);
     }
-    *n_pieces += 1;
-    *last = Some(Piece { number: *n_pieces, t, dt, dt_before: motion.dt });
+    *last = Some(Piece { number: 0, t, dt, dt_before: motion.dt });
     if let Some((_, formula)) = &formula {
         motion.arrive(formula, dt, dofs, before, config);
     }
@@ -667,7 +678,12 @@ fn min_det_f(model: &Model, x: &[Vec3]) -> f64 {
 /// Strain and energy of an accepted state, all of whose nodes are at `x`.
 pub(super) fn strain(model: &Model, state: &State, x: &[Vec3]) -> Strain {
     let at = At { t: state.t, dt: state.outputs.dt, inputs: &state.applied, history: &state.history, ..At::NOWHERE };
-    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(&at, x)))
+    strain_at(model, &at, x)
+}
+
+/// The same where terms see `at`.
+pub(super) fn strain_at(model: &Model, at: &At, x: &[Vec3]) -> Strain {
+    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(at, x)))
 }
 
 fn input3(inputs: &[f64], first: Option<usize>, row: usize) -> Vec3 {
@@ -738,22 +754,35 @@ fn check_inputs(model: &Model, inputs: &[f64]) -> Result<(), SimError> {
     if let Some(k) = (0..parts.tunable.len()).find(|&k| inputs[k] <= 0.0) {
         return Err(SimError::NotPositive { name: model.input_name(k), value: inputs[k] });
     }
-    for (slots, drive) in [
-        ([Slot::BoneTranslation, Slot::BoneRotation], Drive::Pose),
-        ([Slot::BoneForce, Slot::BoneTorque], Drive::Force),
-    ] {
-        for first in slots.iter().filter_map(|s| parts.layout.first(*s)) {
-            for (b, bone) in parts.bones.iter().enumerate().filter(|(_, bone)| bone.drive != drive) {
-                if let Some(k) = (first + 3 * b..first + 3 * b + 3).find(|&k| inputs[k] != 0.0) {
-                    return Err(SimError::NotDriven {
-                        name: model.input_name(k),
-                        value: inputs[k],
-                        bone: bone.name.clone(),
-                        drive: bone.drive,
-                    });
-                }
-            }
+    let drives = [Slot::BoneTranslation, Slot::BoneRotation, Slot::BoneForce, Slot::BoneTorque];
+    for first in drives.iter().filter_map(|slot| parts.layout.first(*slot)) {
+        for k in (first..first + 3 * parts.bones.len()).filter(|&k| inputs[k] != 0.0) {
+            bone_of_input(model, k, inputs[k])?;
         }
+    }
+    Ok(())
+}
+
+/// Whether the bone that input `k` belongs to, if to any, is driven by it.
+///
+/// # Errors
+/// [`SimError::NotDriven`] if it is not.
+pub(super) fn bone_of_input(model: &Model, k: usize, value: f64) -> Result<(), SimError> {
+    let parts = model.parts();
+    let drives = [
+        (Slot::BoneTranslation, Drive::Pose),
+        (Slot::BoneRotation, Drive::Pose),
+        (Slot::BoneForce, Drive::Force),
+        (Slot::BoneTorque, Drive::Force),
+    ];
+    for (slot, drive) in drives {
+        let within = parts.layout.first(slot).and_then(|first| k.checked_sub(first));
+        let Some(bone) = within.and_then(|within| parts.bones.get(within / 3)) else { continue };
+        if bone.drive != drive {
+            let (name, bone, drive) = (model.input_name(k), bone.name.clone(), bone.drive);
+            return Err(SimError::NotDriven { name, value, bone, drive });
+        }
+        return Ok(());
     }
     Ok(())
 }

@@ -73,6 +73,12 @@ impl Cholesky {
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
         );
+        // Asked for at once and let go, since vectors that do not fit end the process.
+        let single = if precision == Precision::Single { size_of::<f32>() } else { 0 };
+        let bytes = symbolic.len_val().saturating_mul(size_of::<f64>() + single).saturating_add(scratch.size_bytes());
+        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+            return Err(SolveError::Memory { unknowns: n, bytes });
+        }
         let panels = match symbolic.raw() {
             SymbolicCholeskyRaw::Supernodal(raw) if precision == Precision::Single => Some(Panels::new(raw, threads)),
             _ => None,

@@ -7,9 +7,11 @@
 //! 36(3), 2017; line search after Nocedal & Wright, "Numerical Optimization", 2nd ed., 2006, sections 3.1 and 3.5, with
 //! the approximate condition of Hager & Zhang, SIAM J. Optim. 16(1), 2005, where energy differences drown in round-off.
 
+use std::sync::Arc;
+
 use super::choice::choose;
 use super::lbfgs::{Lbfgs, dot};
-use super::{LinearSolver, LinearSystems, Precision, Problem, Rung, SolveError};
+use super::{Allowance, LinearSolver, LinearSystems, Precision, Problem, Rung, SolveError};
 use crate::fem::{Assembly, Configuration, Curvature};
 use crate::math::{Mat3, Vec3};
 
@@ -69,6 +71,7 @@ pub struct Minimiser {
     solver: Box<dyn LinearSolver>,
     memory: Lbfgs,
     strategy: Strategy,
+    allowance: Arc<Allowance>,
     /// Rotation from the configuration that was factored to the one at hand.
     frame: Mat3,
     factored: bool,
@@ -105,6 +108,7 @@ impl Minimiser {
             assembly,
             memory: Lbfgs::new(strategy.memory, n),
             strategy,
+            allowance: Arc::default(),
             frame: Mat3::identity(),
             factored: false,
             exact: false,
@@ -116,6 +120,16 @@ impl Minimiser {
             g_trial: vec![Vec3::zeros(); n],
             d: vec![Vec3::zeros(); n],
         })
+    }
+
+    /// Lives on this allowance from now on.
+    pub fn share(&mut self, allowance: &Arc<Allowance>) {
+        self.allowance.clone_from(allowance);
+    }
+
+    /// What it may still spend.
+    pub fn allowance(&self) -> &Arc<Allowance> {
+        &self.allowance
     }
 
     /// Gradient at the nodes after the last minimisation, N: on prescribed nodes minus the reaction of the tissue.
@@ -165,6 +179,7 @@ impl Minimiser {
     /// [`SolveError::Singular`] if even the projected stiffness is not positive definite, [`SolveError::NotFinite`] where
     /// the energy is not defined.
     pub fn linearise(&mut self, problem: &Problem, config: &Configuration) -> Result<(), SolveError> {
+        self.allowance.check()?;
         self.lag.copy_from(config);
         self.factored_at.copy_from(config);
         let energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
@@ -250,10 +265,12 @@ impl Minimiser {
                 outcome.factorisations += 1;
                 age = 0;
             }
+            self.allowance.spend()?;
             let mut slope = self.direction();
             outcome.iterations += 1;
             if slope >= 0.0 || slope.is_nan() {
                 self.memory.forget();
+                self.allowance.spend()?;
                 slope = self.direction();
                 outcome.iterations += 1;
             }

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case)]
 
+mod allowance;
 mod choice;
 mod cholesky;
 mod eigen;
@@ -17,6 +18,7 @@ mod rung;
 mod sweep;
 mod worker;
 
+pub use allowance::Allowance;
 pub use cholesky::{Cholesky, MOST_ENTRIES};
 pub use eigen::{Modes, slowest_modes};
 pub use gradients::Gradients;
@@ -71,6 +73,17 @@ pub enum SolveError {
         /// Most entries.
         limit: usize,
     },
+    /// The machine does not give the memory that the factor wants.
+    #[error(
+        "the factor of {unknowns} unknowns wants {bytes} bytes of memory, which the machine does not give: use a coarser mesh, \
+         or [solver] linear = \"iterative\""
+    )]
+    Memory {
+        /// Scalar unknowns.
+        unknowns: usize,
+        /// Bytes wanted.
+        bytes: usize,
+    },
     /// The step would turn elements inside out; a smaller one may not.
     #[error(
         "elements would be turned inside out: on this path the tissue has no equilibrium without; move or load it less, \
@@ -90,6 +103,18 @@ pub enum SolveError {
         /// Most, m.
         most: f64,
     },
+    /// The step has spent what it may.
+    #[error(
+        "the step was given up after {most} linear solves, the most that it may take (`most_solves` of [solver], port \
+         `solver.mostSolves`): move or load the tissue less at once, or allow more"
+    )]
+    Spent {
+        /// Linear solves allowed.
+        most: u32,
+    },
+    /// The host wants the step no more.
+    #[error("the step was cancelled")]
+    Cancelled,
     /// The modes of vibration were not all found.
     #[error(
         "{found} of {wanted} modes of vibration were found among {size} directions: ask for other `modes` of [inertia], \
@@ -115,8 +140,16 @@ impl SolveError {
             | SolveError::Inverts
             | SolveError::TooDeep { .. }
             | SolveError::TooLarge { .. }
+            | SolveError::Memory { .. }
+            | SolveError::Spent { .. }
+            | SolveError::Cancelled
             | SolveError::Modes { .. } => 1,
         }
+    }
+
+    /// Whether a smaller piece of the step is not to be tried.
+    pub fn is_final(&self) -> bool {
+        matches!(self, SolveError::Spent { .. } | SolveError::Cancelled)
     }
 }
 

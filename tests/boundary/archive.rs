@@ -150,7 +150,8 @@ fn the_full_archive_has_a_scalar_for_every_coordinate_of_the_skin() {
     let scene = cutis::load::embedded().unwrap();
     let count = |version| description(&scene, version).matches("<ScalarVariable").count();
     let skin = scene.model.ports().iter().find(|p| p.name == "skin.position").unwrap();
-    assert_eq!(count(FmiVersion::V2Full), count(FmiVersion::V2) + skin.len());
+    let triangles = scene.model.skin_triangles().len();
+    assert_eq!(count(FmiVersion::V2Full), count(FmiVersion::V2) + skin.len() + triangles);
     let full = description(&scene, FmiVersion::V2Full);
     let reference = (100_u32 << 20) + 5;
     assert!(full.contains(&format!("name=\"skin.position[2,3]\" valueReference=\"{reference}\"")));
@@ -176,6 +177,9 @@ fn the_token_is_a_hash_of_scene_interface_and_mesh() {
         assert!(tokens[..k].iter().all(|b| a != b), "{tokens:?}");
     }
     assert_eq!(tokens[0], scene("", "[3, 2, 1]", ""));
+    // What is no part of model and interface.
+    let aside = "# a comment\nname = \"other\"\nrun = { end = 2.5 }\n";
+    assert_eq!(tokens[0], scene(aside, "[3, 2, 1]", ""));
 }
 
 #[test]

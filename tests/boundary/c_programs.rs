@@ -63,7 +63,7 @@ fn build_and_run(compiler: &str, standard: &str, source: &Path, valgrind: bool) 
         .arg("-L")
         .arg(&folder)
         .arg(format!("-Wl,-rpath,{}", folder.display()))
-        .args(["-lcutis", "-lm", "-ldl"]));
+        .args(["-lcutis", "-lm", "-ldl", "-lpthread"]));
     let scene = scratch("small").join("scene.toml");
     std::fs::write(&scene, SMALL).unwrap();
     let names = root().join("tests/c/fmi_functions.txt");
@@ -93,6 +93,43 @@ fn cpp11_smoke() {
 fn cpp17_wrapper() {
     let said = build_and_run("c++", "-std=c++17", &root().join("tests/c/wrapper.cpp"), false);
     assert!(said.contains("wrapper: all is well"), "{said}");
+}
+
+#[test]
+fn a_hosts_floating_point_environment_changes_nothing() {
+    let said = build_and_run("cc", "-std=c99", &root().join("tests/c/environment.c"), false);
+    assert!(said.contains("environment: all is well"), "{said}");
+}
+
+#[test]
+fn log_callbacks_may_throw() {
+    let said = build_and_run("c++", "-std=c++17", &root().join("tests/c/throws.cpp"), false);
+    assert!(said.contains("throws: all is well"), "{said}");
+}
+
+#[test]
+fn doors_of_the_c_library_refuse_what_they_say() {
+    let said = build_and_run("cc", "-std=c99", &root().join("tests/c/doors.c"), false);
+    assert!(said.contains("doors: all is well"), "{said}");
+}
+
+/// Loads of the library from folders of their own.
+const LOADS: &str = "200";
+
+#[test]
+#[cfg(target_os = "linux")]
+fn the_library_can_be_unloaded_again_and_again() {
+    let (program, folder) = (scratch("c").join("unload"), scratch("unload"));
+    let source = root().join("tests/c/unload.c");
+    run(Command::new("cc")
+        .args(["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-pedantic", "-Werror"])
+        .arg(source)
+        .arg("-o")
+        .arg(&program)
+        .args(["-ldl", "-lpthread"]));
+    let said = run(Command::new(&program).arg(library()).arg(&folder).arg(LOADS));
+    println!("{said}");
+    assert!(said.contains("unload: all is well"), "{said}");
 }
 
 #[test]

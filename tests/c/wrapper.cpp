@@ -1,4 +1,5 @@
 // The C++17 wrapper: owners move, failures throw with their text, states return.
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -48,6 +49,35 @@ int main() {
     for (double x : Jv) one += x * x;
     for (std::size_t k = 0; k < v.size(); ++k) other += JTJv[k] * v[k];
     assert(one > 0.0 && std::fabs(one - other) < 1e-7 * one);
+
+    // Loops as users write them: into vectors and arrays of their own, by index and by name, constant or not.
+    std::vector<double> x(sim.size(skin)), y(sim.size(skin));
+    const std::size_t triangles = sim.port("skin.triangles"), bone = sim.port("bone.translation");
+    std::vector<std::int32_t> t(sim.size(triangles));
+    std::array<double, 6> d{};
+    const std::vector<double> there{0.0, 0.0, 0.0, 0.001, 0.0, 0.0};
+    sim.get(triangles, t);
+    sim.get("skin.triangles", t);
+    for (int k = 0; k < 3; ++k) {
+        d[3 * sim.row(bone, "jaw")] = 1e-4 * k;
+        sim.set(bone, d);
+        sim.set(bone, there);
+        sim.set("bone.translation", there);
+        sim.set("bone.translation", {0.0, 0.0, 0.0, 2e-4 * k, 0.0, 0.0});
+        sim.step(0.1);
+        sim.get(skin, x);
+        sim.get("skin.position", y);
+        assert(x == y && x == sim.get("skin.position"));
+        double buffer[3 * 100];
+        sim.get(skin, cutis::View<double>(buffer, sim.size(skin)));
+    }
+    assert((sim.rows(bone) == std::vector<std::string>{"skull", "jaw"}) && sim.rows(skin).empty());
+    assert(sim.nodes().size() % 3 == 0 && sim.memory() > 1000);
+    sim.start_from(sim.nodes());
+    sim.set_int("solver.mostSolves", 500);
+    sim.cancel();
+    sim.step(0.1);
+    sim.restore(sim.deserialize(bytes));
 
     int thrown = 0;
     auto refused = [&](CutisStatus status, const char *part, auto call) {

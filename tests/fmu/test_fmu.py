@@ -507,12 +507,24 @@ def test_categories_are_told_apart_and_silence_is_kept(archive3, jaw):
     host = Host3(archive3, logging=True)
     host.initialise()
     told = {}
+    host.fmu.setDebugLogging(False, [])
     for names in (["logStatusError"], ["logNonlinearSystems"], []):
         host.fmu.setDebugLogging(True, names)
         host.log.clear()
         host.set("bone.translation", jaw[len(told) + 1])
         host.step(len(told) * DT, DT)
         told[" ".join(names)] = list(host.log)
+    # One switched off, or on again, leaves the others as they are.
+    host.fmu.setDebugLogging(False, ["logStatusDiscard"])
+    host.log.clear()
+    host.set("bone.translation", jaw[4])
+    host.step(3 * DT, DT)
+    assert len(host.log) == 1
+    host.fmu.setDebugLogging(False, ["logNonlinearSystems"])
+    host.fmu.setDebugLogging(True, ["logStatusDiscard"])
+    with pytest.raises(Exception, match="fmi3SetFloat64"):
+        host.set("bone.translation", 1e9 + jaw[4])
+    assert len(host.log) == 2
     host.fmu.setDebugLogging(False, [])
     host.log.clear()
     with pytest.raises(Exception, match="fmi3DoStep"):

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use cutis::port::{Causality, Type};
+use cutis::port::Type;
 use cutis::sim::Sim;
 
 /// Relative to the largest value of a port, and far above what another processor's rounding does to a solution that is
@@ -31,7 +31,7 @@ fn run(scene: &Path) -> Vec<(String, Vec<f64>)> {
         sim.step(loaded.programme.dt).unwrap_or_else(|e| panic!("{}: {e}", scene.display()));
     }
     let ports = sim.model().ports().iter().enumerate();
-    let outputs = ports.filter(|(_, p)| p.causality == Causality::Output && p.ty == Type::Float64);
+    let outputs = ports.filter(|(_, p)| p.is_computed() && p.ty == Type::Float64);
     outputs
         .filter(|(_, p)| p.name != "solver.residual")
         .map(|(k, p)| {
