@@ -33,7 +33,7 @@ pub fn description(scene: &Loaded, version: FmiVersion) -> String {
     }
     document("fmiModelDescription", root, |xml| {
         co_simulation(xml, version, model);
-        let types = Types::of(&ports);
+        let types = Types::of(&ports, version);
         types.write_units(xml);
         types.write_definitions(xml, version);
         element(xml, "LogCategories", vec![], |xml| {
@@ -186,17 +186,19 @@ struct Types {
 struct Definition {
     name: String,
     unit: &'static str,
-    single: bool,
+    /// Whether it is of single precision, where the version knows of that.
+    single: Option<bool>,
 }
 
 impl Definition {
     fn fits(&self, port: &Port) -> bool {
-        port.ty == Type::Float64 && (self.single, self.unit) == (port.single, port.unit)
+        port.ty == Type::Float64 && self.unit == port.unit && self.single.is_none_or(|single| single == port.single)
     }
 }
 
 impl Types {
-    fn of(ports: &[&Port]) -> Self {
+    /// FMI 2.0 has no numbers of single precision.
+    fn of(ports: &[&Port], version: FmiVersion) -> Self {
         let mut definitions: Vec<Definition> = Vec::new();
         for port in ports.iter().filter(|p| p.ty == Type::Float64) {
             if definitions.iter().any(|d| d.fits(port)) {
@@ -204,8 +206,9 @@ impl Types {
             }
             let quantity = UNITS.iter().find(|u| u.name == port.unit).map_or("Quantity", |u| u.quantity);
             // A type may not share its name with a variable; ours begin with a capital, theirs do not.
-            let name = if port.single { format!("Single{quantity}") } else { quantity.to_owned() };
-            definitions.push(Definition { name, unit: port.unit, single: port.single });
+            let single = version.is_3().then_some(port.single);
+            let name = if single == Some(true) { format!("Single{quantity}") } else { quantity.to_owned() };
+            definitions.push(Definition { name, unit: port.unit, single });
         }
         Self { definitions }
     }
@@ -240,7 +243,11 @@ impl Types {
                 match version {
                     FmiVersion::V3 => {
                         attributes.insert(0, ("name", definition.name.clone()));
-                        empty(xml, if definition.single { "Float32Type" } else { "Float64Type" }, attributes);
+                        empty(
+                            xml,
+                            if definition.single == Some(true) { "Float32Type" } else { "Float64Type" },
+                            attributes,
+                        );
                     }
                     FmiVersion::V2 | FmiVersion::V2Full => {
                         element(xml, "SimpleType", vec![("name", definition.name.clone())], |xml| {

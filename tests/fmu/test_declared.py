@@ -6,7 +6,7 @@ import subprocess
 import sys
 import textwrap
 import zipfile
-from ctypes import c_double, c_int32, c_size_t, c_uint32
+from ctypes import c_double, c_int32, c_size_t, c_uint32, c_void_p
 
 import fmpy
 import numpy as np
@@ -36,7 +36,7 @@ def raw(host, function, unknown, known, seed, n):
     """Status and answer of a derivative between two variables."""
     out = (c_double * n)()
     one, two, v = (c_uint32 * 1)(unknown), (c_uint32 * 1)(known), (c_double * len(seed))(*seed)
-    status = host.fmu.dll[function](host.fmu.component, one, c_size_t(1), two, c_size_t(1), v, c_size_t(len(seed)), out, c_size_t(n))
+    status = host.fmu.dll[function](c_void_p(host.fmu.component), one, c_size_t(1), two, c_size_t(1), v, c_size_t(len(seed)), out, c_size_t(n))
     return status, np.array(out)
 
 
@@ -75,7 +75,7 @@ def test_every_declared_derivative_is_answered_in_every_mode(packed):
     host.fmu.enterInitializationMode(startTime=0.0)
     asked = answer_all(host)
     host.fmu.exitInitializationMode()
-    assert answer_all(host) == asked > 5
+    assert answer_all(host) == asked > 3
     host.step(0.0, 0.01)
     host.step(0.01, 0.01)
     assert answer_all(host) == asked
@@ -116,7 +116,7 @@ def test_output_derivatives_of_all_that_moves_and_a_run_after_the_rest(packed):
         n = size(output.variable)
         values = (c_double * n)()
         one = (c_uint32 * 1)(output.variable.valueReference)
-        status = host.fmu.dll["fmi3GetOutputDerivatives"](host.fmu.component, one, c_size_t(1), (c_int32 * 1)(1), values, c_size_t(n))
+        status = host.fmu.dll["fmi3GetOutputDerivatives"](c_void_p(host.fmu.component), one, c_size_t(1), (c_int32 * 1)(1), values, c_size_t(n))
         assert status == (OK if order and output.variable.name in moving else DISCARD), output.variable.name
     host.step(0.01, 0.01)
     host.close()
@@ -156,12 +156,19 @@ def test_terminals_and_types_of_every_archive(packed):
         quantities = [(t.quantity, t.type) for t in archive.description.typeDefinitions]
         assert len(set(quantities)) == len(quantities), "one type a quantity"
         assert archive.description.defaultExperiment.tolerance is not None
-    flagged = {v.name for v in packed[0].description.modelVariables if v.intermediateUpdate}
+    # FMPy does not read the attribute.
+    with zipfile.ZipFile(packed[0].path) as inside:
+        variables = etree.fromstring(inside.read("modelDescription.xml")).find("ModelVariables")
+    flagged = {v.get("name") for v in variables if v.get("intermediateUpdate") == "true"}
     assert {o.variable.name for o in packed[0].description.outputs} <= flagged
 
 
-def test_values_out_of_range_and_held_rows_are_discarded():
-    archive = Archive(ARCHIVES / "cutis.fmu")
+def test_values_out_of_range_and_held_rows_are_discarded(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text("[mesh.block]\nsize = [0.06, 0.04, 0.02]\ncells = [6, 4, 2]\n[[tissue]]\nE = 15e3\nnu = 0.45\n"
+                     "[[bone]]\nname = \"skull\"\nnodes = \"x_min\"\ndrive = \"held\"\n[[bone]]\nname = \"mandible\"\nnodes = \"x_max\"\n")
+    subprocess.run([RELEASE / "cutis", "fmu", scene, "-o", tmp_path], check=True, capture_output=True)
+    archive = Archive(tmp_path / "cutis.fmu")
     host = Host3(archive)
     host.initialise()
     bones = host.variables["bone.translation"]
@@ -171,7 +178,7 @@ def test_values_out_of_range_and_held_rows_are_discarded():
     def put(values):
         flat = np.asarray(values, dtype=np.float64).ravel()
         one, data = (c_uint32 * 1)(bones.valueReference), (c_double * flat.size)(*flat)
-        return host.fmu.dll["fmi3SetFloat64"](host.fmu.component, one, c_size_t(1), data, c_size_t(flat.size))
+        return host.fmu.dll["fmi3SetFloat64"](c_void_p(host.fmu.component), one, c_size_t(1), data, c_size_t(flat.size))
 
     held = d.copy()
     held[rows.index("skull")] = 1e-3
