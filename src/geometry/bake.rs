@@ -5,6 +5,7 @@ use super::clean::{crop, flood, one_body, outer_air, soften_islands, solid_bones
 use super::distance::{travel, unsigned};
 use super::face::{condyles, empty, mouth, nose_tip, region};
 use super::label::{LayerShare, Layers};
+use super::labels::usable;
 use super::separate::{BONES, bone_map};
 use super::stuffing::{Side, Wall};
 use super::warning::{Under, Warning, thin};
@@ -110,11 +111,13 @@ pub fn bake(
     if options.skin_hu >= options.bone_hu {
         return Err(MeshingError::Thresholds { skin: options.skin_hu, bone: options.bone_hu });
     }
+    let volume = &*volume.upright();
     let nose = nose_tip(volume, options)?;
     let region = region(volume, options, &nose)?;
-    if let Some(labels) = labels {
-        covered(labels, &region)?;
-    }
+    let mut warnings = match labels {
+        Some(labels) => usable(labels, volume, options.bone_hu, &region)?,
+        None => Vec::new(),
+    };
     let mut part = part_of(volume, &region);
     progress("surfaces", 0.05);
     one_body(&mut part, options.skin_hu);
@@ -193,7 +196,7 @@ pub fn bake(
     }
     let inner_skin = skin_part(&to_skin.surface, &part, &outer, false);
     let under = Under { to_bone: &to_bone, inner: &inner_skin, bins: Nearest::new(&inner_skin, options.edge) };
-    let mut warnings = thin(&outer_skin, &under, options.edge, options.thicken, &inner);
+    warnings.extend(thin(&outer_skin, &under, options.edge, options.thicken, &inner));
     if !told {
         warnings.push(Warning::JawNotFound);
     }
@@ -209,18 +212,6 @@ pub fn bake(
     let condyles = if told { condyles(&bone_surfaces[1], &nose) } else { None };
     let mouth = mouth.map(|m| [m.lips.low, m.lips.high]);
     Ok(Baked { mesh, report, warnings, layers, condyles, mouth, slit_nodes, released_nodes })
-}
-
-/// Whether the labels lie where the region is.
-fn covered(labels: &Labels, region: &Cuboid) -> Result<(), MeshingError> {
-    let [low, high] = labels.grid.bounds();
-    let slack = 2.0 * labels.grid.spacing.max();
-    let misses = (0..3).any(|a| low[a] > region.low[a] + slack || high[a] < region.high[a] - slack);
-    if misses {
-        let corners = |low: Vec3, high: Vec3| [low.into(), high.into()];
-        return Err(MeshingError::Labels { region: corners(region.low, region.high), labels: corners(low, high) });
-    }
-    Ok(())
 }
 
 /// The samples of a volume in and round a region.

@@ -77,13 +77,22 @@ pub enum MeshingError {
     },
     /// Labels of another place.
     #[error(
-        "the labels {labels:.3?} m do not cover the region to mesh {region:.3?} m (LPS); give the labels of this scan"
+        "the labels {labels:.3?} m do not overlap the region to mesh {region:.3?} m (LPS); give the labels of this scan"
     )]
     Labels {
         /// Corners of the region, LPS, m.
         region: [[f64; 3]; 2],
         /// Corners of the labels, LPS, m.
         labels: [[f64; 3]; 2],
+    },
+    /// Labels without any bone.
+    #[error(
+        "the labels hold the numbers {found} and no bone; wanted 2 (skull), 3 (mandible) and 4 (spine): say what stands \
+         for them, for example `--labels-map skull=5,mandible=1`"
+    )]
+    LabelNumbers {
+        /// Numbers found, as a list.
+        found: String,
     },
     /// The finished mesh broke a rule every mesh keeps.
     #[error(transparent)]

@@ -6,6 +6,10 @@ use crate::math::Vec3;
 
 /// The face about the nose tip, m: to the right, in front, below; to the left, behind, above.
 const FACE: [[f64; 3]; 2] = [[-0.086, -0.006, -0.096], [0.086, 0.122, 0.082]];
+/// Thickness of the foremost layer of skin, in voxels.
+const LAYER: f64 = 0.5;
+/// What places are rounded to, m.
+const NANOMETRE: f64 = 1e-9;
 /// Height of a condyle's head, m.
 const CONDYLE: f64 = 0.005;
 /// Half width and half height of the mouth, and how far behind the front of the teeth the slit may reach, m.
@@ -23,7 +27,7 @@ pub(super) fn empty(name: &'static str, iso: f64, volume: &Volume) -> MeshingErr
     MeshingError::EmptyIsosurface { name, iso, least: f64::from(least), most: f64::from(most) }
 }
 
-/// The foremost skin point of the volume: the tip of the nose, if the face is in it.
+/// The middle of the foremost layer of skin in the volume: the tip of the nose, if the face is in it.
 pub(super) fn nose_tip(volume: &Volume, options: &BakeOptions) -> Result<Vec3, MeshingError> {
     let grid = &volume.grid;
     let [nx, ny, _] = grid.dims;
@@ -34,15 +38,27 @@ pub(super) fn nose_tip(volume: &Volume, options: &BakeOptions) -> Result<Vec3, M
     };
     let body = (0..grid.len()).filter(|&at| number[at] as usize == largest + 1);
     let place = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
-    let foremost = body.map(place).min_by(|p, q| p.y.total_cmp(&q.y));
-    foremost.ok_or_else(|| empty("skin", options.skin_hu, volume))
+    let front = body.clone().map(|at| place(at).y).fold(f64::INFINITY, f64::min);
+    // All voxels of the layer count: which of them is the foremost by round-off, or the first stored, says nothing.
+    let depth = LAYER * (0..3).map(|a| (grid.direction[(1, a)] * grid.spacing[a]).abs()).sum::<f64>();
+    let (n, sum) =
+        body.map(place).filter(|p| p.y < front + depth).fold((0usize, Vec3::zeros()), |(n, s), p| (n + 1, s + p));
+    if n == 0 {
+        return Err(empty("skin", options.skin_hu, volume));
+    }
+    Ok(rounded(Vec3::new(sum.x / n as f64, front, sum.z / n as f64)))
+}
+
+/// Rounded so that sums in another order, or coordinates that were stored in another way, give the same.
+fn rounded(p: Vec3) -> Vec3 {
+    p.map(|x| (x / NANOMETRE).round() * NANOMETRE)
 }
 
 /// The region of interest, inside the volume.
 pub(super) fn region(volume: &Volume, options: &BakeOptions, nose: &Vec3) -> Result<Cuboid, MeshingError> {
     let [low, high] = volume.grid.bounds();
     let [from, to] = options.roi.unwrap_or(FACE.map(|c| nose + Vec3::from(c)));
-    let region = Cuboid { low: from.inf(&to).sup(&low), high: from.sup(&to).inf(&high) };
+    let region = Cuboid { low: rounded(from.inf(&to).sup(&low)), high: rounded(from.sup(&to).inf(&high)) };
     if (region.high - region.low).min() < 2.0 * options.edge {
         return Err(MeshingError::Region { region: [from.into(), to.into()], volume: [low.into(), high.into()] });
     }

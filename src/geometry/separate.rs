@@ -13,6 +13,8 @@ use crate::math::Vec3;
 
 /// Names of the bones, numbered from 1 in a bone map.
 pub(super) const BONES: [&str; 3] = ["skull", "mandible", "spine"];
+/// Their numbers in a labels file.
+pub(super) const LABELS: [u8; 3] = [2, 3, 4];
 const SKULL: u8 = 1;
 const MANDIBLE: u8 = 2;
 const SPINE: u8 = 3;
@@ -39,11 +41,9 @@ pub(super) fn bone_map(volume: &Volume, bone: f64, labels: Option<&Labels>, nose
     };
     let (mut map, told) = match labels {
         Some(labels) => {
-            let of = |at: usize| match labels.at(&position(at)) {
-                2 => SKULL,
-                3 => MANDIBLE,
-                4 => SPINE,
-                _ => 0,
+            let of = |at: usize| {
+                let label = labels.at(&position(at));
+                LABELS.iter().zip(SKULL..).find(|(l, _)| **l == label).map_or(0, |(_, bone)| bone)
             };
             let map: Vec<u8> = (0..grid.len()).map(|at| if is_bone(at) { of(at) } else { 0 }).collect();
             let told = map.contains(&SKULL) && map.contains(&MANDIBLE);

@@ -2,7 +2,19 @@
 //!
 //! World axes are LPS in metres: x to the patient's left, y to the back, z up.
 
+use std::borrow::Cow;
+
 use crate::math::{Mat3, Vec3};
+
+/// What positions of voxels are rounded to, m.
+const PICOMETRE: f64 = 1e-12;
+/// Orders of three axes.
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+
+/// A position without the round-off of how it was stored.
+pub(crate) fn rounded(x: &Vec3) -> Vec3 {
+    x.map(|c| (c / PICOMETRE).round() * PICOMETRE)
+}
 
 /// Where the samples of a regular grid lie: `x = origin + direction * (spacing .* [i, j, k])`.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,6 +112,44 @@ impl Volume {
         self.grid.sample(&self.samples, p)
     }
 
+    /// The same samples with grid axes that run along x, y and z as nearly as they can, so that nothing depends on the
+    /// order in which voxels are stored.
+    pub fn upright(&self) -> Cow<'_, Volume> {
+        let grid = &self.grid;
+        let along = |order: &[usize; 3]| (0..3).map(|a| grid.direction[(a, order[a])].abs()).sum::<f64>();
+        let order = ORDERS.into_iter().fold(ORDERS[0], |best, o| if along(&o) > along(&best) { o } else { best });
+        let turned = [0, 1, 2].map(|a| grid.direction[(a, order[a])] < 0.0);
+        if order == ORDERS[0] && turned == [false; 3] {
+            return Cow::Borrowed(self);
+        }
+        let sign = |a: usize| if turned[a] { -1.0 } else { 1.0 };
+        let last = Vec3::from_fn(|g, _| {
+            let a = (0..3).find(|&a| order[a] == g).unwrap_or(g);
+            if turned[a] { grid.dims[g] as f64 - 1.0 } else { 0.0 }
+        });
+        let upright = Grid {
+            dims: order.map(|g| grid.dims[g]),
+            spacing: Vec3::from_fn(|a, _| grid.spacing[order[a]]),
+            origin: rounded(&grid.world(&last)),
+            // Adding zero makes -0 one.
+            direction: Mat3::from_fn(|r, a| grid.direction[(r, order[a])] * sign(a) + 0.0),
+        };
+        let [nx, ny, nz] = upright.dims;
+        let mut samples = Vec::with_capacity(upright.len());
+        for k in 0..nz {
+            for j in 0..ny {
+                for i in 0..nx {
+                    let mut stored = [0; 3];
+                    for (a, at) in [i, j, k].into_iter().enumerate() {
+                        stored[order[a]] = if turned[a] { upright.dims[a] - 1 - at } else { at };
+                    }
+                    samples.push(self.samples[grid.index(stored)]);
+                }
+            }
+        }
+        Cow::Owned(Volume { grid: upright, samples })
+    }
+
     /// Smallest and largest sample.
     pub fn range(&self) -> (f32, f32) {
         self.samples.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &s| (low.min(s), high.max(s)))
@@ -116,8 +166,10 @@ pub struct Labels {
 }
 
 impl Labels {
-    /// Label of the voxel nearest to a world position, clamped to the grid.
+    /// Label of the voxel that a world position lies in; 0 outside of all.
     pub fn at(&self, p: &Vec3) -> u8 {
-        self.ids[self.grid.index(self.grid.nearest(p))]
+        let c = self.grid.coordinates(p);
+        let inside = (0..3).all(|a| (-0.5..=self.grid.dims[a] as f64 - 0.5).contains(&c[a]));
+        if inside { self.ids[self.grid.index(self.grid.nearest(p))] } else { 0 }
     }
 }

@@ -47,6 +47,25 @@ pub enum Warning {
     },
     /// A layer that the mesh is too coarse for.
     Layer(LayerShare),
+    /// A bone that the labels do not have.
+    NoLabel {
+        /// The bone and its number.
+        bone: &'static str,
+        /// Its number.
+        wanted: u8,
+        /// Numbers found, as a list.
+        found: String,
+    },
+    /// Labels of a part of the region only.
+    LabelsCropped {
+        /// Corners of the labels, LPS, m.
+        labels: [Vec3; 2],
+    },
+    /// Labels of bone where there is none.
+    LabelsOffBone {
+        /// Share of the voxels labelled as bone that are at or above the threshold of bone.
+        share: f64,
+    },
 }
 
 impl fmt::Display for Warning {
@@ -71,6 +90,24 @@ impl fmt::Display for Warning {
                 "no oral slit was cut: no faces between the jaws in the mouth's box; give the box of the mouth"
             ),
             Self::Dropped { pieces, volume } => write!(f, "{pieces} loose piece(s) of {:.2} mL left out", volume * 1e6),
+            Self::NoLabel { bone, wanted, found } => write!(
+                f,
+                "the labels have no {bone}: found the numbers {found}, wanted {wanted} (other numbers: --labels-map)"
+            ),
+            Self::LabelsCropped { labels: [low, high] } => {
+                let (p, q) = (low * 1e3, high * 1e3);
+                write!(
+                    f,
+                    "the labels reach from ({:.1}, {:.1}, {:.1}) to ({:.1}, {:.1}, {:.1}) mm LPS, the region goes beyond: \
+                     bone out there belongs to the labelled bone that it hangs on, else to the skull",
+                    p.x, p.y, p.z, q.x, q.y, q.z
+                )
+            }
+            Self::LabelsOffBone { share } => write!(
+                f,
+                "{:.0} % of what the labels call bone is bone by its density: are they the labels of this scan?",
+                100.0 * share
+            ),
             Self::Layer(s) => write!(
                 f,
                 "layer `{}` takes {:.1} % of the volume, by depth it should take {:.1} %: choose a shorter edge",
