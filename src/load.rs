@@ -30,6 +30,8 @@ pub struct Baked {
     pub scene: String,
     /// Bytes of the baked mesh.
     pub mesh: Vec<u8>,
+    /// What was noticed of the files that it was made from.
+    pub notes: Vec<String>,
 }
 
 /// Loads `scene`; files it names are relative to its folder.
@@ -56,9 +58,10 @@ pub fn from_text(text: &str, folder: Option<&Path>) -> Result<Loaded, Error> {
 pub fn with_skin(text: &str, folder: Option<&Path>, skin: FineSkin) -> Result<Loaded, Error> {
     let path = Path::new("<text>");
     let file = parse(text, path)?;
-    let mesh = TetMesh { fine_skin: Some(skin), ..mesh_of(text, &file, path, folder)? };
+    let (mesh, notes) = mesh_of(text, &file, path, folder)?;
+    let mesh = TetMesh { fine_skin: Some(skin), ..mesh };
     let (model, programme) = build(text, &file, mesh).map_err(|e| scene_error(path, e))?;
-    Ok(Loaded { model, programme })
+    Ok(Loaded { model: model.with_notes(notes), programme })
 }
 
 /// Small-strain constants of the tissues of a scene, in order.
@@ -76,7 +79,7 @@ pub fn small_strain(text: &str) -> Result<Vec<SmallStrain>, Error> {
 /// [`Error`].
 pub fn mesh(text: &str, folder: Option<&Path>) -> Result<TetMesh, Error> {
     let path = Path::new("<text>");
-    mesh_of(text, &parse(text, path)?, path, folder)
+    Ok(mesh_of(text, &parse(text, path)?, path, folder)?.0)
 }
 
 /// A mesh file that a scene names, relative to `folder`.
@@ -84,7 +87,7 @@ pub fn mesh(text: &str, folder: Option<&Path>) -> Result<TetMesh, Error> {
 /// # Errors
 /// [`Error`].
 pub fn mesh_file(folder: Option<&Path>, name: &str) -> Result<TetMesh, Error> {
-    Ok(io::read_mesh(&beside(folder, name))?)
+    Ok(io::read_mesh(&beside(folder, name), &mut Vec::new())?)
 }
 
 /// Loads the default scene.
@@ -122,16 +125,16 @@ impl Baked {
         let file = parse(&self.scene, path)?;
         let mesh = io::decode(&self.mesh, path)?;
         let (model, programme) = build(&self.scene, &file, mesh).map_err(|e| scene_error(path, e))?;
-        Ok(Loaded { model, programme })
+        Ok(Loaded { model: model.with_notes(self.notes.clone()), programme })
     }
 }
 
 fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, Error> {
     let file = parse(text, path)?;
-    let mut mesh = mesh_of(text, &file, path, folder)?;
+    let (mut mesh, notes) = mesh_of(text, &file, path, folder)?;
     let (model, _) = build(text, &file, mesh.clone()).map_err(|e| scene_error(path, e))?;
     mesh.elimination = model.elimination();
-    Ok(Baked { scene: scene::packed(text, BAKED_NAME), mesh: io::encode(&mesh) })
+    Ok(Baked { scene: scene::packed(text, BAKED_NAME), mesh: io::encode(&mesh), notes })
 }
 
 fn read(path: &Path) -> Result<String, Error> {
@@ -148,14 +151,16 @@ fn parse(text: &str, path: &Path) -> Result<SceneFile, Error> {
 
 fn load(text: &str, path: &Path, folder: Option<&Path>) -> Result<Loaded, Error> {
     let file = parse(text, path)?;
-    let mesh = mesh_of(text, &file, path, folder)?;
+    let (mesh, notes) = mesh_of(text, &file, path, folder)?;
     let (model, programme) = build(text, &file, mesh).map_err(|e| scene_error(path, e))?;
-    Ok(Loaded { model, programme })
+    Ok(Loaded { model: model.with_notes(notes), programme })
 }
 
-fn mesh_of(text: &str, file: &SceneFile, path: &Path, folder: Option<&Path>) -> Result<TetMesh, Error> {
+/// The mesh of a scene, and what was noticed of the files that it came from.
+fn mesh_of(text: &str, file: &SceneFile, path: &Path, folder: Option<&Path>) -> Result<(TetMesh, Vec<String>), Error> {
+    let mut notes = Vec::new();
     let mut mesh = match file.mesh_source(text).map_err(|e| scene_error(path, e))? {
-        MeshSource::File(name) => io::read_mesh(&beside(folder, &name))?,
+        MeshSource::File(name) => io::read_mesh(&beside(folder, &name), &mut notes)?,
         MeshSource::Block { origin, size, cells, forty_eight, layers } => {
             let pattern = if forty_eight { Pattern::FortyEight } else { Pattern::Six };
             block(&Block { origin, size, cells, pattern, layers })?
@@ -167,12 +172,12 @@ fn mesh_of(text: &str, file: &SceneFile, path: &Path, folder: Option<&Path>) -> 
     };
     if let Some(source) = file.skin_source(text).map_err(|e| scene_error(path, e))? {
         mesh.fine_skin = Some(match source {
-            SkinSource::File(name) => io::read_surface(&beside(folder, &name))?,
+            SkinSource::File(name) => io::read_surface(&beside(folder, &name), &mut notes)?,
             SkinSource::Head { edge } => FineSkin::of(&Head { edge, ..Head::default() }.mesh()?.0),
             SkinSource::Subdivided(times) => (0..times).fold(FineSkin::of(&mesh), |skin, _| skin.subdivided()),
         });
     }
-    Ok(mesh)
+    Ok((mesh, notes))
 }
 
 fn beside(folder: Option<&Path>, name: &str) -> PathBuf {

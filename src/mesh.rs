@@ -116,10 +116,10 @@ pub enum MeshError {
         /// Wanted.
         wanted: usize,
     },
-    /// Two sets share a name.
-    #[error("two {kind} sets are named `{name}`; names must be unique")]
+    /// Two regions or two sets share a name.
+    #[error("two of the {kind} sets are named `{name}`; names must be unique")]
     DuplicateName {
-        /// "node" or "face".
+        /// "region", "node" or "face".
         kind: &'static str,
         /// The name.
         name: String,
@@ -128,6 +128,15 @@ pub enum MeshError {
 
 /// Volumes below this share of the cube of the longest edge are rounding: such an element has no inverse.
 const FLAT: f64 = 1e-15;
+
+/// Faces of a tetrahedron by its corners, wound outward.
+pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// The same numbers in ascending order.
+pub(crate) fn sorted<const N: usize>(mut nodes: [u32; N]) -> [u32; N] {
+    nodes.sort_unstable();
+    nodes
+}
 
 /// Signed volume of a tetrahedron, m3; positive where the corners turn right-handed.
 pub fn signed_volume(x: [Vec3; 4]) -> f64 {
@@ -230,6 +239,7 @@ impl TetMesh {
         if let Some(skin) = &self.fine_skin {
             skin.check()?;
         }
+        unique("region", self.region_names.iter())?;
         unique("node", self.node_sets.iter().map(|s| &s.name))?;
         unique("face", self.face_sets.iter().map(|s| &s.name))?;
         let inverted = |e: &usize| !self.has_room(*e);
@@ -255,14 +265,11 @@ impl TetMesh {
 
     /// Boundary triangles of all tetrahedra, wound outward, in the order of the tetrahedra they close.
     pub fn boundary(&self) -> Vec<[u32; 3]> {
-        const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
         let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::with_capacity(4 * self.tets.len());
         for tet in &self.tets {
             for face in FACES {
                 let wound = face.map(|a| tet[a]);
-                let mut key = wound;
-                key.sort_unstable();
-                faces.push((key, wound));
+                faces.push((sorted(wound), wound));
             }
         }
         let mut order: Vec<u32> = (0..faces.len() as u32).collect();

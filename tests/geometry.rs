@@ -3,10 +3,15 @@ mod geometry {
     mod bake;
     mod block;
     mod ct_files;
+    mod dicom_files;
     mod distance;
+    mod foreign_meshes;
     mod head;
     mod marching_cubes;
     mod mesh_files;
+    mod nifti_files;
     mod noise;
+    mod nrrd_files;
+    mod storage;
     mod stuffing;
 }

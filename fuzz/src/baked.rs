@@ -31,7 +31,7 @@ pub fn once(data: &[u8]) {
     }
     let scene = "[mesh]\nfile = \"model.cutis\"\n[[tissue]]\nE = 15e3\nnu = 0.4\n[[bone]]\nname = \"skull\"\n\
                  nodes = \"x_min\"\n[[bone]]\nname = \"jaw\"\nnodes = \"x_max\"\n";
-    let Ok(loaded) = (Baked { scene: scene.to_owned(), mesh: file }).load() else { return };
+    let Ok(loaded) = (Baked { scene: scene.to_owned(), mesh: file, notes: Vec::new() }).load() else { return };
     if let Ok(mut sim) = Sim::new(Arc::new(loaded.model)) {
         scenes::exercise(&mut sim, 0.01);
     }

@@ -24,15 +24,16 @@ pub fn once(data: &[u8]) {
     let extension = EXTENSIONS[usize::from(kind) % EXTENSIONS.len()];
     let path = folder().join("in").with_extension(extension);
     std::fs::write(&path, file).expect("room for a file");
-    let _ = read_surface(&path);
-    let Ok(mesh) = read_mesh(&path) else { return };
+    let _ = read_surface(&path, &mut Vec::new());
+    let Ok(mesh) = read_mesh(&path, &mut Vec::new()) else { return };
     for extension in ["cutis", "vtk", "vtu", "msh"] {
         let path = folder().join("out").with_extension(extension);
         // A name may be more than a format can hold.
         if write_mesh(&path, &mesh).is_err() {
             continue;
         }
-        let again = read_mesh(&path).unwrap_or_else(|why| panic!("what was written as .{extension} is refused: {why}"));
+        let again = read_mesh(&path, &mut Vec::new())
+            .unwrap_or_else(|why| panic!("what was written as .{extension} is refused: {why}"));
         assert_eq!(again.tets, mesh.tets, "tetrahedra change on their way through .{extension}");
         let bits = |m: &cutis::mesh::TetMesh| -> Vec<u64> {
             m.nodes.iter().flat_map(|x| x.iter().map(|c| c.to_bits()).collect::<Vec<_>>()).collect()

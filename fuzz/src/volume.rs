@@ -26,9 +26,9 @@ pub fn once(data: &[u8]) {
         std::fs::write(path.join("2.dcm"), slice(2.0)).expect("room for a file");
     } else {
         std::fs::write(&path, file).expect("room for a file");
-        let _ = read_labels(&path);
+        let _ = read_labels(&path, &cutis::io::LabelMap::default(), &mut Vec::new());
     }
-    if let Ok(volume) = read_volume(&path) {
+    if let Ok(volume) = read_volume(&path, &mut Vec::new()) {
         check(&volume);
     }
 }
@@ -159,6 +159,6 @@ pub fn seeds_are_read() {
         } else {
             std::fs::write(&path, sound(kind)).expect("room");
         }
-        check(&read_volume(&path).unwrap_or_else(|why| panic!("{}: {why}", path.display())));
+        check(&read_volume(&path, &mut Vec::new()).unwrap_or_else(|why| panic!("{}: {why}", path.display())));
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use cutis::geometry::{BakeOptions, bake};
-use cutis::io;
+use cutis::io::{self, LabelMap};
 use cutis::math::Vec3;
 
 use super::progress;
@@ -15,6 +15,9 @@ pub struct Bake {
     /// Labels of the same head: 2 skull, 3 mandible, 4 spine (NIfTI or NRRD)
     #[arg(short, long)]
     labels: Option<PathBuf>,
+    /// Numbers of the labels file that stand for bones, for example skull=5,mandible=1 (a bone may have several)
+    #[arg(long, requires = "labels", value_name = "BONE=NUMBER,...")]
+    labels_map: Option<LabelMap>,
     /// Mesh to write: .cutis, .msh, .vtu or .vtk
     #[arg(short, long, default_value = "face.cutis")]
     out: PathBuf,
@@ -40,8 +43,15 @@ pub struct Bake {
 
 impl Bake {
     pub fn run(self) -> super::Done {
-        let volume = io::read_volume(&self.volume)?;
-        let labels = self.labels.as_deref().map(io::read_labels).transpose()?;
+        // Before the work, not after it.
+        io::check_mesh_target(&self.out)?;
+        let mut notes = Vec::new();
+        let volume = io::read_volume(&self.volume, &mut notes)?;
+        let map = self.labels_map.unwrap_or_default();
+        let labels = self.labels.as_deref().map(|path| io::read_labels(path, &map, &mut notes)).transpose()?;
+        for note in &notes {
+            eprintln!("warning: {note}");
+        }
         let corners = |mm: &Option<Vec<f64>>| {
             mm.as_ref().map(|c| [Vec3::new(c[0], c[1], c[2]) * 1e-3, Vec3::new(c[3], c[4], c[5]) * 1e-3])
         };

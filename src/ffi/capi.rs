@@ -347,7 +347,7 @@ pub unsafe extern "C" fn cutis_sim_new_from_baked(
         new_sim(why, why_len, || {
             let scene = scene.ok_or("`scene` is NULL or not UTF-8")?.to_owned();
             let mesh = mesh.map_err(|refusal| refusal.message)?.to_vec();
-            load::Baked { scene, mesh }.load().map_err(in_words)
+            load::Baked { scene, mesh, notes: Vec::new() }.load().map_err(in_words)
         })
     }
 }

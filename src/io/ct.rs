@@ -1,54 +1,66 @@
 //! CT volumes by file kind. Here millimetres become metres and stored numbers Hounsfield units.
 
-use std::io::Read;
 use std::path::Path;
 
-use super::{IoError, dicom, nifti, nrrd};
-use crate::geometry::{Grid, Labels, Volume};
+use super::{IoError, LabelMap, dicom, nifti, nrrd};
+use crate::geometry::{Grid, Labels, Volume, rounded};
 use crate::math::{Mat3, Vec3};
 
 /// Metres in a millimetre.
 pub(super) const MILLI: f64 = 1e-3;
 /// Largest deviation of the axes' scalar products from 0 that passes as rounding.
 const SHEAR: f64 = 1e-3;
-/// Deflate's best ratio: what bounds an unpacked size from the packed one.
-const MOST_INFLATION: u64 = 1032;
-const CHOICES: &str = ".nii, .nii.gz, .nrrd, .nhdr, or a folder with a DICOM series";
+/// Longest edge of a box about a head or a part of it, m; beyond these a unit of length is doubtful.
+const HEAD: [f64; 2] = [0.03, 1.5];
+const CHOICES: &str = ".nii, .nii.gz, .hdr, .img, .nrrd, .nhdr, or a folder with a DICOM series";
 
-/// Reads a CT: a NIfTI or NRRD file, or a folder that holds one DICOM series.
+/// Reads a CT: a NIfTI or NRRD file, or a folder that holds one DICOM series. What was passed over, assumed or is
+/// doubtful is added to `notes`, a sentence each.
 ///
 /// # Errors
-/// [`IoError`] by what is wrong: unreadable, truncated or malformed files, another modality, gantry tilt, missing or
-/// unevenly spaced slices, mixed series, compressed pixels.
-pub fn read_volume(path: &Path) -> Result<Volume, IoError> {
+/// [`IoError`] by what is wrong: unreadable, truncated or malformed files, fields that change samples or places and are
+/// not understood, another modality, gantry tilt, missing or unevenly spaced slices, mixed series.
+pub fn read_volume(path: &Path, notes: &mut Vec<String>) -> Result<Volume, IoError> {
+    let mut told = Vec::new();
+    let volume = by_kind(path, &mut told)?;
+    let [low, high] = volume.grid.bounds();
+    let size = high - low;
+    if !(HEAD[0]..=HEAD[1]).contains(&size.max()) {
+        let mm = size / MILLI;
+        told.push(format!(
+            "the volume measures {:.4} x {:.4} x {:.4} mm, which is no head: check the unit of its spacing",
+            mm.x, mm.y, mm.z
+        ));
+    }
+    notes.extend(told.into_iter().map(|note| format!("{}: {note}", path.display())));
+    Ok(volume)
+}
+
+fn by_kind(path: &Path, told: &mut Vec<String>) -> Result<Volume, IoError> {
     if path.is_dir() {
-        return dicom::read_series(path);
+        return dicom::read_series(path, told);
     }
     let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("").to_ascii_lowercase();
-    if name.ends_with(".nii") || name.ends_with(".nii.gz") {
-        nifti::read(path)
-    } else if name.ends_with(".nrrd") || name.ends_with(".nhdr") {
-        nrrd::read(path)
-    } else if name.ends_with(".dcm") || name.ends_with(".ima") {
-        Err(IoError::unsupported(path, "one DICOM slice", "give the folder that holds the series"))
+    let named = |endings: &[&str]| endings.iter().any(|e| name.ends_with(e));
+    if named(&[".nii", ".nii.gz", ".hdr", ".img", ".hdr.gz", ".img.gz"]) {
+        nifti::read(path, told)
+    } else if named(&[".nrrd", ".nhdr"]) {
+        nrrd::read(path, told)
+    } else if named(&[".dcm", ".ima"]) {
+        dicom::read_frames(path, told)
     } else {
         std::fs::metadata(path).map_err(IoError::file(path))?;
         Err(IoError::Extension { path: path.into(), choices: CHOICES })
     }
 }
 
-/// Reads tissue numbers 0..255 from a NIfTI or NRRD file.
+/// Reads tissue numbers from a NIfTI or NRRD file: 2 skull, 3 mandible, 4 spine, or what `map` makes such.
 ///
 /// # Errors
-/// As [`read_volume`]; [`IoError::Format`] where a number is not a whole one in 0..255.
-pub fn read_labels(path: &Path) -> Result<Labels, IoError> {
-    let Volume { grid, samples } = read_volume(path)?;
-    let whole = |s: &f32| s.fract() == 0.0 && (0.0..=255.0).contains(s);
-    if let Some(k) = samples.iter().position(|s| !whole(s)) {
-        let place = format!("voxel {k}");
-        return Err(IoError::format(path, place, samples[k].to_string(), "label numbers 0..255"));
-    }
-    Ok(Labels { grid, ids: samples.into_iter().map(|s| s as u8).collect() })
+/// As [`read_volume`]; [`IoError::Format`] where a number is not a whole one in 0..255 or one of `map` is not there.
+pub fn read_labels(path: &Path, map: &LabelMap, notes: &mut Vec<String>) -> Result<Labels, IoError> {
+    let Volume { grid, samples } = read_volume(path, notes)?;
+    map.labels(path, grid, &samples)
 }
 
 /// Number type of stored samples.
@@ -60,6 +72,8 @@ pub(super) enum Scalar {
     U16,
     I32,
     U32,
+    I64,
+    U64,
     F32,
     F64,
 }
@@ -70,47 +84,51 @@ impl Scalar {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
+            Self::I64 | Self::U64 | Self::F64 => 8,
         }
     }
 
     /// Samples of a byte string.
     pub fn decode(self, bytes: &[u8], little: bool) -> Vec<f32> {
-        fn each<const N: usize>(bytes: &[u8], little: bool, f: impl Fn([u8; N]) -> f32) -> Vec<f32> {
-            let turn = |mut b: [u8; N]| {
-                if !little {
-                    b.reverse();
-                }
-                f(b)
-            };
-            bytes.as_chunks::<N>().0.iter().map(|b| turn(*b)).collect()
-        }
+        self.scaled(bytes, little, 1.0, 0.0)
+    }
+
+    /// Samples of a byte string, `slope` times as much and `shift` added.
+    pub fn scaled(self, bytes: &[u8], little: bool, slope: f64, shift: f64) -> Vec<f32> {
+        let each = Each { bytes, little, slope, shift };
         match self {
-            Self::I8 => each(bytes, little, |b| f32::from(i8::from_le_bytes(b))),
-            Self::U8 => each(bytes, little, |b| f32::from(u8::from_le_bytes(b))),
-            Self::I16 => each(bytes, little, |b| f32::from(i16::from_le_bytes(b))),
-            Self::U16 => each(bytes, little, |b| f32::from(u16::from_le_bytes(b))),
-            Self::I32 => each(bytes, little, |b| i32::from_le_bytes(b) as f32),
-            Self::U32 => each(bytes, little, |b| u32::from_le_bytes(b) as f32),
-            Self::F32 => each(bytes, little, f32::from_le_bytes),
-            Self::F64 => each(bytes, little, |b| f64::from_le_bytes(b) as f32),
+            Self::I8 => each.read(|b| f64::from(i8::from_le_bytes(b))),
+            Self::U8 => each.read(|b| f64::from(u8::from_le_bytes(b))),
+            Self::I16 => each.read(|b| f64::from(i16::from_le_bytes(b))),
+            Self::U16 => each.read(|b| f64::from(u16::from_le_bytes(b))),
+            Self::I32 => each.read(|b| f64::from(i32::from_le_bytes(b))),
+            Self::U32 => each.read(|b| f64::from(u32::from_le_bytes(b))),
+            Self::I64 => each.read(|b| i64::from_le_bytes(b) as f64),
+            Self::U64 => each.read(|b| u64::from_le_bytes(b) as f64),
+            Self::F32 => each.read(|b| f64::from(f32::from_le_bytes(b))),
+            Self::F64 => each.read(f64::from_le_bytes),
         }
     }
 }
 
-/// Unpacks gzip, but never more than `limit` bytes nor more than the packed bytes can hold.
-pub(super) fn gunzip(path: &Path, packed: &[u8], limit: u64) -> Result<Vec<u8>, IoError> {
-    let mut out = Vec::new();
-    let limit = limit.min((packed.len() as u64).saturating_mul(MOST_INFLATION));
-    match flate2::read::MultiGzDecoder::new(packed).take(limit).read_to_end(&mut out) {
-        Ok(_) => Ok(out),
-        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
-            Err(IoError::truncated(path, "the gzip stream", packed.len() as u64 + 1, packed.len() as u64))
-        }
-        Err(e) => Err(IoError::format(path, "the gzip stream", e.to_string(), "gzip data")),
-    }
+struct Each<'a> {
+    bytes: &'a [u8],
+    little: bool,
+    slope: f64,
+    shift: f64,
 }
 
+impl Each<'_> {
+    fn read<const N: usize>(&self, value: impl Fn([u8; N]) -> f64) -> Vec<f32> {
+        let turn = |mut b: [u8; N]| {
+            if !self.little {
+                b.reverse();
+            }
+            (value(b) * self.slope + self.shift) as f32
+        };
+        self.bytes.as_chunks::<N>().0.iter().map(|b| turn(*b)).collect()
+    }
+}
 /// A grid from the world steps (mm, LPS) of its axes.
 pub(super) fn grid(path: &Path, dims: [usize; 3], axes: [Vec3; 3], origin: Vec3) -> Result<Grid, IoError> {
     if dims.iter().any(|&n| n < 2) {
@@ -119,6 +137,9 @@ pub(super) fn grid(path: &Path, dims: [usize; 3], axes: [Vec3; 3], origin: Vec3)
             format!("a grid of {dims:?} samples"),
             "a volume of at least 2 x 2 x 2 is needed",
         ));
+    }
+    if dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d)).is_none_or(|n| n > isize::MAX as usize / 8) {
+        return Err(IoError::unsupported(path, format!("a grid of {dims:?} samples"), "no memory holds as many"));
     }
     let lengths = axes.map(|a| a.norm());
     if !lengths.iter().all(|l| l.is_finite() && *l > 0.0) || !origin.iter().all(|c| c.is_finite()) {
@@ -137,7 +158,7 @@ pub(super) fn grid(path: &Path, dims: [usize; 3], axes: [Vec3; 3], origin: Vec3)
     Ok(Grid {
         dims,
         spacing: Vec3::from(lengths) * MILLI,
-        origin: origin * MILLI,
+        origin: rounded(&(origin * MILLI)),
         direction: Mat3::from_columns(&unit),
     })
 }

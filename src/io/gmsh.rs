@@ -16,6 +16,9 @@ use crate::mesh::{FaceSet, NodeSet, TetMesh};
 const POINT: u32 = 15;
 const TRIANGLE: u32 = 2;
 const TET: u32 = 4;
+/// Carry no set of ours.
+const LINE: u32 = 1;
+const QUAD: u32 = 3;
 
 /// A mesh as `.msh` 4.1 text; the element numbers keep the order of the tetrahedra.
 pub(super) fn text(mesh: &TetMesh, path: &Path) -> Result<String, IoError> {
@@ -113,9 +116,22 @@ struct Element {
     groups: Vec<i64>,
 }
 
+/// Sections that say nothing about the mesh itself.
+const HARMLESS: [&str; 8] = [
+    "$Comments",
+    "$Parametrizations",
+    "$GhostElements",
+    "$InterpolationScheme",
+    "$NodeData",
+    "$ElementData",
+    "$ElementNodeData",
+    "$Periodic",
+];
+
 #[derive(Default)]
 struct File {
     names: BTreeMap<(u8, i64), String>,
+    /// Physical groups of an entity, by dimension and tag.
     entities: BTreeMap<(u8, i64), Vec<i64>>,
     tags: Vec<u64>,
     nodes: Vec<Vec3>,
@@ -123,7 +139,7 @@ struct File {
 }
 
 /// The mesh in the bytes of a `.msh` file.
-pub(super) fn read(bytes: &[u8], path: &Path) -> Result<TetMesh, IoError> {
+pub(super) fn read(bytes: &[u8], path: &Path, told: &mut Vec<String>) -> Result<TetMesh, IoError> {
     let text = String::from_utf8_lossy(bytes);
     let mut words = Words::new(path, &text);
     let mut file = File::default();
@@ -140,15 +156,31 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<TetMesh, IoError> {
                     let found = format!("MSH format {version}");
                     return Err(IoError::unsupported(path, found, "4.1 and 2.2 are read: save it as one of them"));
                 }
+                let size = words.need("the size of numbers")?;
+                if size != "8" {
+                    return Err(words.slip(&format!("numbers of {size} bytes"), "8"));
+                }
             }
             "$PhysicalNames" => {
                 for _ in 0..words.count("number of names")? {
                     let (dim, tag) = (words.parse("a dimension")?, words.parse("a physical tag")?);
                     let name = words.line().unwrap_or("").trim_matches('"').to_string();
-                    file.names.insert((dim, tag), name);
+                    if file.names.insert((dim, tag), name).is_some() {
+                        return Err(words.slip(&format!("a second name of group {tag}"), "one name a physical group"));
+                    }
                 }
             }
-            "$Entities" => read_entities(&mut words, &mut file)?,
+            "$Entities" => read_entities(&mut words, &mut file, false)?,
+            "$PartitionedEntities" => {
+                words.parse::<u64>("number of partitions")?;
+                for _ in 0..words.count("number of ghost entities")? {
+                    let _: (i64, i64) = (words.parse("a ghost entity")?, words.parse("a partition")?);
+                }
+                read_entities(&mut words, &mut file, true)?;
+            }
+            "$ParametricNodes" => {
+                return Err(words.slip("$ParametricNodes", "$Nodes (Mesh.SaveParametric = 0)"));
+            }
             "$Nodes" if version >= 4.0 => read_nodes_4(&mut words, &mut file)?,
             "$Nodes" => {
                 for _ in 0..words.count("number of nodes")? {
@@ -164,6 +196,9 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<TetMesh, IoError> {
                     return Err(words.slip(&format!("`{section:.40}`"), "$MeshFormat"));
                 }
                 while words.need(&end)? != end {}
+                if !HARMLESS.contains(&section) {
+                    told.push(format!("section {section} is not known and was passed over"));
+                }
                 continue;
             }
         }
@@ -173,14 +208,15 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<TetMesh, IoError> {
     if version == 0.0 {
         return Err(IoError::format(path, "line 1", "no $MeshFormat", "a Gmsh .msh file"));
     }
-    file.into_mesh(path)
+    file.into_mesh(path, told)
 }
 
 fn position(words: &mut Words) -> Result<Vec3, IoError> {
     Ok(Vec3::new(words.parse("x")?, words.parse("y")?, words.parse("z")?))
 }
 
-fn read_entities(words: &mut Words, file: &mut File) -> Result<(), IoError> {
+/// Entities, or parts of them, which name their parent and partitions.
+fn read_entities(words: &mut Words, file: &mut File, parts: bool) -> Result<(), IoError> {
     let mut counts = [0; 4];
     for count in &mut counts {
         *count = words.count("number of entities")?;
@@ -188,11 +224,19 @@ fn read_entities(words: &mut Words, file: &mut File) -> Result<(), IoError> {
     for (dim, count) in (0u8..).zip(counts) {
         for _ in 0..count {
             let tag = words.parse("an entity tag")?;
+            if parts {
+                let _: (u8, i64) = (words.parse("a parent's dimension")?, words.parse("a parent's tag")?);
+                for _ in 0..words.count("number of partitions")? {
+                    words.parse::<i64>("a partition")?;
+                }
+            }
             for _ in 0..if dim == 0 { 3 } else { 6 } {
                 words.parse::<f64>("a bounding coordinate")?;
             }
             let n = words.count("number of physical tags")?;
-            let groups = (0..n).map(|_| words.parse("a physical tag")).collect::<Result<_, _>>()?;
+            // A negative tag says that elements are turned, which the tetrahedra tell anyway.
+            let groups = (0..n).map(|_| Ok(words.parse::<i64>("a physical tag")?.saturating_abs()));
+            let groups = groups.collect::<Result<_, IoError>>()?;
             if dim > 0 {
                 for _ in 0..words.count("number of bounding entities")? {
                     words.parse::<i64>("an entity tag")?;
@@ -210,34 +254,40 @@ fn read_nodes_4(words: &mut Words, file: &mut File) -> Result<(), IoError> {
         words.parse::<u64>("a node count")?;
     }
     for _ in 0..blocks {
-        let _: (u8, i64) = (words.parse("a dimension")?, words.parse("an entity tag")?);
-        if words.need("parametric flag")? != "0" {
-            return Err(words.slip("parametric coordinates", "plain coordinates (Mesh.SaveParametric = 0)"));
-        }
+        let (dim, _): (usize, i64) = (words.parse("a dimension")?, words.parse("an entity tag")?);
+        let parameters = match words.need("parametric flag")? {
+            "0" => 0,
+            "1" if dim <= 3 => dim,
+            found => return Err(words.slip(&format!("`{found}`"), "parametric flag 0 or 1")),
+        };
         let n = words.count("number of nodes")?;
         for _ in 0..n {
             file.tags.push(words.parse("a node number")?);
         }
         for _ in 0..n {
             file.nodes.push(position(words)?);
+            for _ in 0..parameters {
+                words.parse::<f64>("a parametric coordinate")?;
+            }
         }
     }
     Ok(())
 }
 
-/// Nodes of an element of this type; `None` for types that carry no set of ours (lines).
+/// Nodes of an element of this type.
 fn node_count(kind: u32, path: &Path) -> Result<usize, IoError> {
     match kind {
         POINT => Ok(1),
-        1 => Ok(2),
+        LINE => Ok(2),
         TRIANGLE => Ok(3),
-        TET | 3 => Ok(4),
+        TET | QUAD => Ok(4),
         _ => {
             let found = format!("elements of Gmsh type {kind}");
             Err(IoError::unsupported(
                 path,
                 found,
-                "linear tetrahedra are read: mesh with order 1 and without recombination",
+                "linear tetrahedra are read: mesh with order 1 and without recombination; a scene makes quadratic elements \
+                 of them (`[mesh] order = 2`)",
             ))
         }
     }
@@ -268,7 +318,7 @@ fn read_elements_2(words: &mut Words, file: &mut File, path: &Path) -> Result<()
         let kind = words.parse("an element type")?;
         let n = words.count("number of tags")?;
         let tags: Vec<i64> = (0..n).map(|_| words.parse("a tag")).collect::<Result<_, _>>()?;
-        let groups = tags.first().filter(|&&t| t != 0).map_or(Vec::new(), |&t| vec![t]);
+        let groups = tags.first().filter(|&&t| t != 0).map_or(Vec::new(), |&t| vec![t.saturating_abs()]);
         let n_corners = node_count(kind, path)?;
         let nodes = (0..n_corners).map(|_| words.parse("a node number")).collect::<Result<_, _>>()?;
         file.elements.push(Element { tag, kind, nodes, groups });
@@ -287,10 +337,34 @@ impl File {
         names
     }
 
-    fn into_mesh(mut self, path: &Path) -> Result<TetMesh, IoError> {
+    /// Tells of elements that end up in no set, and of tetrahedra in several.
+    fn tell_ungrouped(&self, told: &mut Vec<String>) {
+        let count = |kind: u32, pass: &dyn Fn(usize) -> bool| {
+            self.elements.iter().filter(|e| e.kind == kind && pass(e.groups.len())).count()
+        };
+        let any_group = self.elements.iter().any(|e| e.kind == TET && !e.groups.is_empty());
+        let mut tell = |n: usize, what: &str| {
+            if n > 0 {
+                told.push(format!("{n} {what}"));
+            }
+        };
+        if any_group {
+            tell(count(TET, &|n| n == 0), "tetrahedra are in no physical volume: they make the region `tissue`");
+        }
+        tell(count(TET, &|n| n > 1), "tetrahedra are in several physical volumes: the first counts");
+        tell(count(TRIANGLE, &|n| n == 0), "triangles are in no physical surface and were passed over");
+        tell(count(QUAD, &|n| n > 0), "quadrangles in physical surfaces were passed over: tetrahedra have triangles");
+        tell(count(LINE, &|n| n > 0), "lines in physical curves were passed over: sets are of points and surfaces");
+    }
+
+    fn into_mesh(mut self, path: &Path, told: &mut Vec<String>) -> Result<TetMesh, IoError> {
         self.elements.sort_by_key(|e| e.tag);
         let mut index: Vec<(u64, u32)> = self.tags.iter().copied().zip(0u32..).collect();
         index.sort_unstable();
+        if let Some(pair) = index.windows(2).find(|w| w[0].0 == w[1].0) {
+            return Err(IoError::format(path, "$Nodes", format!("node {} twice", pair[0].0), "each node once"));
+        }
+        self.tell_ungrouped(told);
         let node = |tag: u64| {
             let found = index.binary_search_by_key(&tag, |p| p.0).ok().map(|k| index[k].1);
             found.ok_or_else(|| IoError::format(path, "$Elements", format!("node {tag}"), "a node of $Nodes"))

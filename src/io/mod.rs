@@ -4,13 +4,16 @@
 mod baked;
 mod ct;
 mod dicom;
-mod dicom_lengths;
 mod error;
 mod file;
+mod foreign;
 mod gmsh;
+mod gzip;
+mod labels;
 mod mesh;
 mod nifti;
 mod nrrd;
+mod nrrd_files;
 mod text;
 mod vtk;
 
@@ -18,5 +21,6 @@ pub use baked::{decode, encode};
 pub use ct::{read_labels, read_volume};
 pub use error::IoError;
 pub use file::{create_folder, read_bytes, read_text, remove_file, rename, write_bytes};
-pub use mesh::{read_mesh, read_surface, write_mesh};
+pub use labels::LabelMap;
+pub use mesh::{check_mesh_target, read_mesh, read_surface, write_mesh};
 pub use vtk::{Data, write_pvd, write_vtp, write_vtu};

@@ -13,8 +13,9 @@ pub(crate) struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
+    /// At the beginning, behind a byte-order mark.
     pub fn new(path: &'a Path, text: &'a str) -> Self {
-        Self { path, rest: text, line: 1 }
+        Self { path, rest: text.trim_start_matches('\u{feff}'), line: 1 }
     }
 
     fn skip_blank(&mut self) {

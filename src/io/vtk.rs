@@ -1,7 +1,7 @@
 //! VTK unstructured grids: `.vtu` with raw appended data, legacy `.vtk` in text, `.pvd` time series; surfaces as `.vtp`.
 //!
 //! Source: "VTK File Formats", Kitware, the XML and the legacy chapter. Regions are cell data `region` with their names
-//! in field data, node sets point data `set:<name>`, face sets field data `faces:<name>`.
+//! in field data, node sets point data `set:<name>`, face sets field data `faces:<name>` or cell data of that name on triangles.
 
 mod base64;
 mod grid;
@@ -20,13 +20,18 @@ pub(crate) use legacy::legacy_text;
 pub(crate) use vtu_write::vtu_bytes;
 
 /// The tetrahedral mesh in the bytes of a `.vtu` file, or of a legacy `.vtk` one.
-pub(crate) fn read(bytes: &[u8], path: &Path, legacy: bool) -> Result<TetMesh, IoError> {
-    grid(bytes, path, legacy)?.into_mesh(path)
+pub(crate) fn read(bytes: &[u8], path: &Path, legacy: bool, told: &mut Vec<String>) -> Result<TetMesh, IoError> {
+    grid(bytes, path, legacy)?.into_mesh(path, told)
 }
 
 /// Points and triangles in the same.
-pub(crate) fn read_triangles(bytes: &[u8], path: &Path, legacy: bool) -> Result<FineSkin, IoError> {
-    grid(bytes, path, legacy)?.into_triangles(path)
+pub(crate) fn read_triangles(
+    bytes: &[u8],
+    path: &Path,
+    legacy: bool,
+    told: &mut Vec<String>,
+) -> Result<FineSkin, IoError> {
+    grid(bytes, path, legacy)?.into_triangles(path, told)
 }
 
 fn grid(bytes: &[u8], path: &Path, legacy: bool) -> Result<grid::Grid, IoError> {

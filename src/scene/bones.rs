@@ -1,5 +1,7 @@
 //! Bones: which nodes they hold, where they start, what is released between them.
 
+use toml::Spanned;
+
 use super::SceneError;
 use super::build::Builder;
 use super::file::BoneSpec;
@@ -22,13 +24,10 @@ impl Builder<'_> {
         let mut bones = Vec::new();
         for spec in specs {
             let wanted = spec.nodes.as_ref().unwrap_or(&spec.name);
-            let nodes = match mesh.node_set(wanted.get_ref()) {
-                Some(set) => self.within(spec, &set.nodes, mesh)?,
+            let nodes = match set_nodes(mesh, wanted.get_ref()) {
+                Some(nodes) => self.within(spec, &nodes, mesh)?,
                 None if wants_no_nodes(spec) => Vec::new(),
-                None => {
-                    let sets = mesh.node_sets.iter().map(|s| s.name.as_str());
-                    return Err(self.text.unknown("node set", wanted, sets.chain([NO_NODES])));
-                }
+                None => return Err(self.no_set(wanted, mesh)),
             };
             for &a in &nodes {
                 let Some(other) = owner[a as usize].replace(spec.name.get_ref()) else { continue };
@@ -52,6 +51,24 @@ impl Builder<'_> {
         }
         bones.iter_mut().for_each(|b| b.nodes.retain(|a| !shared[*a as usize]));
         Ok(bones)
+    }
+
+    /// Says which sets there are.
+    fn no_set(&self, wanted: &Spanned<String>, mesh: &TetMesh) -> SceneError {
+        let list = |kind: &str, names: Vec<&String>| match names.as_slice() {
+            [] => format!("no {kind} set"),
+            names => {
+                format!("the {kind} sets {}", names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", "))
+            }
+        };
+        let nodes = list("node", mesh.node_sets.iter().map(|s| &s.name).collect());
+        let faces = list("face", mesh.face_sets.iter().map(|s| &s.name).collect());
+        let message = format!(
+            "unknown node set `{}`, nor is there a face set of that name: the mesh has {nodes} and {faces}; `{NO_NODES}` is for a \
+             bone without tissue",
+            wanted.get_ref()
+        );
+        self.text.at(wanted.span().start, message)
     }
 
     /// Those of `nodes` that lie in the bone's box.
@@ -135,6 +152,17 @@ impl Builder<'_> {
         }
         Ok(())
     }
+}
+
+/// The nodes of the node set of this name, else of the face set.
+fn set_nodes(mesh: &TetMesh, name: &str) -> Option<Vec<u32>> {
+    if let Some(set) = mesh.node_set(name) {
+        return Some(set.nodes.clone());
+    }
+    let mut nodes = mesh.face_set(name)?.triangles.as_flattened().to_vec();
+    nodes.sort_unstable();
+    nodes.dedup();
+    Some(nodes)
 }
 
 /// Whether a bone is to have no tissue.

@@ -176,7 +176,7 @@ pub const KEYS: &[Key] = &[
     key("tissue.tension", "across", "float", "Pa", NonNegative, "`along`", "Tension across it in the plane of the skin."),
     key("tissue.tension", "direction", "[float; 3]", "", Any, "any", "Direction laid into the plane of the skin; wanted where `across` differs."),
     key("bone", "name", "string", "", Any, "required", "Name: the row of the `bone.*` ports."),
-    key("bone", "nodes", "string", "", Any, "the name", "Node set of the mesh that sticks to the bone; `none` where no tissue does and it carries a [[contact]] only, such as a finger."),
+    key("bone", "nodes", "string", "", Any, "the name", "Node set of the mesh that sticks to the bone, or the nodes of the face set of that name; `none` where no tissue does and it carries a [[contact]] only, such as a finger."),
     key("bone", "within", "[[float; 3]; 2]", "m", Any, "everywhere", "Smallest and largest corner of a box that the nodes must lie in, walls included."),
     key("bone", "drive", "string", "", OneOf(&["held", "pose", "force", "displacement"]), "\"pose\"", "Held at rest, moved by pose, by force and torque, or node by node."),
     key("bone", "pivot", "[float; 3]", "m", Any, "centroid of the nodes", "Rest position of the point that it turns about."),

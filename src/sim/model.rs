@@ -305,6 +305,13 @@ impl Model {
     pub(super) fn shared_token(&self) -> Arc<str> {
         self.token.clone()
     }
+    /// The same with these warnings before its own: what was noticed of the files that it came from.
+    #[must_use]
+    pub fn with_notes(mut self, notes: Vec<String>) -> Self {
+        self.parts.warnings.splice(0..0, notes);
+        self
+    }
+
     /// What the user should know about the model.
     pub fn warnings(&self) -> &[String] {
         &self.parts.warnings

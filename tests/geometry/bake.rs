@@ -1,6 +1,6 @@
 //! Real heads: from the CT to named tetrahedra, with and without labels, and what bad volumes are told.
 use cutis::geometry::{BakeOptions, Baked, MeshingError, Volume, Warning, bake};
-use cutis::io::{read_labels, read_volume, write_mesh};
+use cutis::io::{LabelMap, read_labels, read_volume, write_mesh};
 
 use super::ct_files::data;
 use super::stuffing::DIHEDRAL;
@@ -76,7 +76,10 @@ fn the_slit_parts_the_lips_in_release() {
     let (Some(crop), Some(labels)) = (data("cthead_face_bench.nii.gz"), data("cthead_face_bench_labels.nii.gz")) else {
         return;
     };
-    let (volume, labels) = (read_volume(&crop).unwrap(), read_labels(&labels).unwrap());
+    let (volume, labels) = (
+        read_volume(&crop, &mut Vec::new()).unwrap(),
+        read_labels(&labels, &LabelMap::default(), &mut Vec::new()).unwrap(),
+    );
     let options = BakeOptions { edge: 6e-3, ..BakeOptions::default() };
     let parted = run(&volume, Some(&labels), &options, "parted");
     let closed = run(&volume, Some(&labels), &BakeOptions { slit: false, ..options.clone() }, "closed");
@@ -91,7 +94,10 @@ fn clean_head_with_labels_in_release() {
     let (Some(head), Some(labels)) = (data("cthead_unc_clean.nii.gz"), data("cthead_unc_labels.nii.gz")) else {
         return;
     };
-    let (volume, labels) = (read_volume(&head).unwrap(), read_labels(&labels).unwrap());
+    let (volume, labels) = (
+        read_volume(&head, &mut Vec::new()).unwrap(),
+        read_labels(&labels, &LabelMap::default(), &mut Vec::new()).unwrap(),
+    );
     let baked = run(&volume, Some(&labels), &BakeOptions::default(), "clean_labels");
     assert!(count(&baked, "skull") > 1000 && count(&baked, "mandible") > 500);
     assert!(baked.slit_nodes > 100);
@@ -107,13 +113,13 @@ fn clean_head_with_labels_in_release() {
 #[test]
 fn clean_head_without_labels_in_release() {
     let Some(head) = data("cthead_unc_clean.nii.gz") else { return };
-    let volume = read_volume(&head).unwrap();
+    let volume = read_volume(&head, &mut Vec::new()).unwrap();
     let options = BakeOptions { edge: 5e-3, ..BakeOptions::default() };
     let baked = run(&volume, None, &options, "clean_bare");
     assert!(count(&baked, "skull") > 500 && count(&baked, "mandible") > 300);
     assert!(baked.warnings.iter().any(|w| matches!(w, Warning::Thin { .. })));
     if let Some(labels) = data("cthead_unc_labels.nii.gz") {
-        let labels = read_labels(&labels).unwrap();
+        let labels = read_labels(&labels, &LabelMap::default(), &mut Vec::new()).unwrap();
         // A bone node lies on the bone's surface: the labels round it name the bone, 2 skull, 3 mandible, 4 spine (which
         // without labels counts as skull).
         let share = |name: &str, wanted: [u8; 2]| {
@@ -138,7 +144,10 @@ fn lower_face_crop_bakes_too_in_release() {
     let (Some(crop), Some(labels)) = (data("cthead_face_bench.nii.gz"), data("cthead_face_bench_labels.nii.gz")) else {
         return;
     };
-    let (volume, labels) = (read_volume(&crop).unwrap(), read_labels(&labels).unwrap());
+    let (volume, labels) = (
+        read_volume(&crop, &mut Vec::new()).unwrap(),
+        read_labels(&labels, &LabelMap::default(), &mut Vec::new()).unwrap(),
+    );
     let [low, high] = volume.grid.bounds();
     let options = BakeOptions { roi: Some([low, high]), depth: 1.0, ..BakeOptions::default() };
     let baked = run(&volume, Some(&labels), &options, "crop");
@@ -149,7 +158,7 @@ fn lower_face_crop_bakes_too_in_release() {
 #[test]
 fn coarse_head_of_two_millimetres() {
     let Some(head) = data("cthead_unc_2mm.nrrd") else { return };
-    let volume = read_volume(&head).unwrap();
+    let volume = read_volume(&head, &mut Vec::new()).unwrap();
     let options = BakeOptions { edge: 6e-3, ..BakeOptions::default() };
     let baked = run(&volume, None, &options, "coarse");
     assert!(count(&baked, "skull") > 300);
@@ -160,7 +169,7 @@ fn coarse_head_of_two_millimetres() {
 #[test]
 fn bad_volumes_are_told() {
     let Some(head) = data("vtk_headsq_quarter.nrrd") else { return };
-    let volume = read_volume(&head).unwrap();
+    let volume = read_volume(&head, &mut Vec::new()).unwrap();
     let refused = |change: &dyn Fn(&mut f32), options: &BakeOptions| {
         let mut v = volume.clone();
         v.samples.iter_mut().for_each(change);

@@ -1,7 +1,7 @@
 //! CT volumes: every reader agrees, and every kind of bad input is told apart.
 use std::path::{Path, PathBuf};
 
-use cutis::io::{IoError, read_labels, read_volume};
+use cutis::io::{IoError, LabelMap, read_labels, read_volume};
 
 use super::mesh_files::scratch;
 
@@ -20,7 +20,7 @@ pub fn data(name: &str) -> Option<PathBuf> {
 #[test]
 fn nrrd_and_dicom_hold_the_same_volume() {
     let (Some(nrrd), Some(dicom)) = (data("cthead_unc_2mm.nrrd"), data("dicom_2mm")) else { return };
-    let (a, b) = (read_volume(&nrrd).unwrap(), read_volume(&dicom).unwrap());
+    let (a, b) = (read_volume(&nrrd, &mut Vec::new()).unwrap(), read_volume(&dicom, &mut Vec::new()).unwrap());
     assert_eq!(a.grid.dims, [128, 128, 113]);
     assert!((a.grid.origin - b.grid.origin).norm() < 1e-9, "{} {}", a.grid.origin, b.grid.origin);
     assert!((a.grid.spacing - b.grid.spacing).norm() < 1e-9);
@@ -32,10 +32,10 @@ fn nifti_head_and_labels() {
     let (Some(head), Some(labels)) = (data("cthead_unc_clean.nii.gz"), data("cthead_unc_labels.nii.gz")) else {
         return;
     };
-    let volume = read_volume(&head).unwrap();
+    let volume = read_volume(&head, &mut Vec::new()).unwrap();
     assert_eq!(volume.grid.dims, [256, 256, 113]);
     assert!((volume.grid.origin.x + 0.1275).abs() < 1e-12 && (volume.grid.spacing.z - 0.002).abs() < 1e-12);
-    let labels = read_labels(&labels).unwrap();
+    let labels = read_labels(&labels, &LabelMap::default(), &mut Vec::new()).unwrap();
     assert_eq!(labels.grid, volume.grid);
     // The mandible's chin, by index (106, 45, 16).
     let chin = labels.grid.world(&nalgebra::Vector3::new(106.0, 45.0, 16.0));
@@ -107,7 +107,7 @@ fn series(name: &str, change: impl Fn(usize, &mut Dcm) -> bool) -> Result<cutis:
         }
     }
     std::fs::write(folder.join("README"), "not a slice").unwrap();
-    read_volume(&folder)
+    read_volume(&folder, &mut Vec::new())
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn dicom_series_are_checked() {
         s.syntax = "1.2.840.10008.1.2.4.70";
         true
     });
-    assert!(matches!(jpeg, IoError::Unsupported { .. }) && jpeg.to_string().contains("compressed"), "{jpeg}");
+    assert!(matches!(jpeg, IoError::Unsupported { .. }) && jpeg.to_string().contains("another way"), "{jpeg}");
     let shape = error("shape", &|k, s| {
         s.rows = if k == 2 { 5 } else { 4 };
         true
@@ -154,14 +154,14 @@ fn dicom_series_are_checked() {
     let bytes = std::fs::read(&cut).unwrap();
     for end in [10, 140, 300, bytes.len() - 5] {
         std::fs::write(&cut, &bytes[..end]).unwrap();
-        assert!(read_volume(&scratch("good")).is_err(), "cut at {end}");
+        assert!(read_volume(&scratch("good"), &mut Vec::new()).is_err(), "cut at {end}");
     }
 }
 
 fn nrrd(name: &str, head: &str, data: &[u8]) -> Result<cutis::geometry::Volume, IoError> {
     let path = scratch(name);
     std::fs::write(&path, [head.as_bytes(), data].concat()).unwrap();
-    read_volume(&path)
+    read_volume(&path, &mut Vec::new())
 }
 
 #[test]
@@ -175,7 +175,7 @@ fn nrrd_is_checked() {
     let data: Vec<u8> = (0..8i16).flat_map(|v| v.to_le_bytes()).collect();
     let volume = nrrd("a.nrrd", &head("2 2 2", straight, "raw"), &data).unwrap();
     assert_eq!(volume.samples[7], 7.0);
-    assert_eq!(volume.grid.origin * 1e3, nalgebra::Vector3::new(-1.0, -2.0, 3.0));
+    assert!((volume.grid.origin * 1e3 - nalgebra::Vector3::new(-1.0, -2.0, 3.0)).norm() < 1e-12);
     assert_eq!(volume.grid.direction[(0, 0)], -1.0);
     let text = nrrd("t.nrrd", &head("2 2 2", straight, "ascii"), b"0 1 2 3 4 5 6 7").unwrap();
     assert_eq!(text, volume);
@@ -196,18 +196,18 @@ fn cut_nifti_is_told() {
     let cut = scratch("cut.nii.gz");
     for share in [0, 1, 5, 9] {
         std::fs::write(&cut, &bytes[..bytes.len() * share / 10]).unwrap();
-        let error = read_volume(&cut).unwrap_err();
+        let error = read_volume(&cut, &mut Vec::new()).unwrap_err();
         assert!(matches!(error, IoError::Truncated { .. }), "{error}");
     }
-    assert!(matches!(read_volume(Path::new("nowhere.nii")).unwrap_err(), IoError::File { .. }));
+    assert!(matches!(read_volume(Path::new("nowhere.nii"), &mut Vec::new()).unwrap_err(), IoError::File { .. }));
 }
 
 #[test]
 fn samples_are_not_read_from_a_device() {
     let path = scratch("endless").with_extension("nhdr");
     let header = "NRRD0004\ntype: short\ndimension: 3\nspace: lps\nsizes: 3 2 2\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n\
-                  encoding: raw\ndata file: /dev/zero\n";
+                  encoding: raw\nendian: little\ndata file: /dev/zero\n";
     std::fs::write(&path, header).unwrap();
-    let message = read_volume(&path).unwrap_err().to_string();
-    assert!(cfg!(not(unix)) || message.contains("no file: /dev/zero"), "{message}");
+    let message = read_volume(&path, &mut Vec::new()).unwrap_err().to_string();
+    assert!(cfg!(not(unix)) || message.contains("/dev/zero: this is a pipe, a socket or a device"), "{message}");
 }

@@ -12,6 +12,12 @@ pub fn scratch(name: &str) -> PathBuf {
     dir.join(name)
 }
 
+/// A name that no other test takes, for files that are written again and again.
+pub fn fresh(name: &str) -> PathBuf {
+    static NEXT: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
+    scratch(&format!("{}_{name}", NEXT.fetch_add(1, std::sync::atomic::Ordering::Relaxed)))
+}
+
 fn sample() -> TetMesh {
     let mut mesh = block(&Block {
         origin: Vec3::new(1.0 / 3.0, -0.1, 1e-7),
@@ -36,9 +42,9 @@ fn every_format_returns_the_same_bits() {
     for extension in ["vtu", "vtk", "msh", "cutis"] {
         let path = scratch(&format!("round.{extension}"));
         write_mesh(&path, &mesh).unwrap();
-        assert_eq!(read_mesh(&path).unwrap(), mesh, "{extension}");
+        assert_eq!(read_mesh(&path, &mut Vec::new()).unwrap(), mesh, "{extension}");
         let first = std::fs::read(&path).unwrap();
-        write_mesh(&path, &read_mesh(&path).unwrap()).unwrap();
+        write_mesh(&path, &read_mesh(&path, &mut Vec::new()).unwrap()).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), first, "{extension}");
     }
 }
@@ -54,14 +60,17 @@ fn truncated_and_scrambled_files_are_errors() {
         for k in 0..60 {
             let end = bytes.len() * k / 60;
             std::fs::write(&cut, &bytes[..end]).unwrap();
-            assert!(read_mesh(&cut).is_err() || end > bytes.len() * 9 / 10, "{extension} cut at {end}");
+            assert!(
+                read_mesh(&cut, &mut Vec::new()).is_err() || end > bytes.len() * 9 / 10,
+                "{extension} cut at {end}"
+            );
         }
         for k in 0..200usize {
             let mut bad = bytes.clone();
             let at = k.wrapping_mul(7919) % bad.len().min(4000);
             bad[at] = bad[at].wrapping_add(1 + (k % 250) as u8);
             std::fs::write(&cut, &bad).unwrap();
-            let _ = read_mesh(&cut);
+            let _ = read_mesh(&cut, &mut Vec::new());
         }
     }
 }
@@ -89,10 +98,10 @@ fn lying_counts_do_not_allocate() {
     let path = scratch("liar.vtk");
     let text = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 99999999999999 double\n0 0 0\n";
     std::fs::write(&path, text).unwrap();
-    assert!(matches!(read_mesh(&path), Err(IoError::Truncated { .. })));
+    assert!(matches!(read_mesh(&path, &mut Vec::new()), Err(IoError::Truncated { .. })));
     let path = scratch("liar.msh");
     std::fs::write(&path, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n18446744073709551615\n1 0 0 0\n").unwrap();
-    assert!(matches!(read_mesh(&path), Err(IoError::Truncated { .. })));
+    assert!(matches!(read_mesh(&path, &mut Vec::new()), Err(IoError::Truncated { .. })));
 }
 
 const FOREIGN_MSH2: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 7 \"skin\"\n3 9 \"my tissue\"\n$EndPhysicalNames\n\
@@ -106,13 +115,13 @@ CELL_DATA 2\nSCALARS region int 1\nLOOKUP_TABLE default\n3\n8\n";
 fn foreign_files_are_read() {
     let path = scratch("foreign.msh");
     std::fs::write(&path, FOREIGN_MSH2).unwrap();
-    let mesh = read_mesh(&path).unwrap();
+    let mesh = read_mesh(&path, &mut Vec::new()).unwrap();
     assert_eq!((mesh.nodes.len(), mesh.tets.len()), (4, 1));
     assert_eq!(mesh.region_names, ["my tissue"]);
     assert_eq!(mesh.face_sets[0].triangles, [[0, 2, 1]]);
     let path = scratch("foreign.vtk");
     std::fs::write(&path, FOREIGN_VTK).unwrap();
-    let mesh = read_mesh(&path).unwrap();
+    let mesh = read_mesh(&path, &mut Vec::new()).unwrap();
     assert_eq!((mesh.tets.len(), mesh.region_names[0].as_str()), (1, "region_8"));
     assert!(mesh.face_sets.is_empty());
 }
@@ -132,13 +141,13 @@ fn surfaces_are_read_and_baked() {
     for (name, text) in [("surface.vtk", vtk), ("surface.msh", msh)] {
         let path = scratch(name);
         std::fs::write(&path, text).unwrap();
-        assert_eq!(read_surface(&path).unwrap(), wanted, "{name}");
+        assert_eq!(read_surface(&path, &mut Vec::new()).unwrap(), wanted, "{name}");
     }
     let mesh = TetMesh { fine_skin: Some(wanted.clone()), ..sample() };
     assert_eq!(decode(&encode(&mesh), Path::new("baked")).unwrap(), mesh);
     let path = scratch("no_surface.vtk");
     std::fs::write(&path, vtk.replace("\n5\n3\n5\n", "\n3\n3\n3\n").replace("3 1 2 3", "2 1 2")).unwrap();
-    assert!(read_surface(&path).unwrap_err().to_string().contains("triangles"));
+    assert!(read_surface(&path, &mut Vec::new()).unwrap_err().to_string().contains("triangles"));
     let torn = TetMesh { fine_skin: Some(FineSkin { triangles: vec![[0, 1, 9]], ..wanted }), ..sample() };
     assert!(torn.checked().is_err());
 }
@@ -188,7 +197,7 @@ fn vtu_of_other_writers_is_read() {
     for (k, text) in texts.iter().enumerate() {
         let path = scratch(&format!("other{k}.vtu"));
         std::fs::write(&path, text).unwrap();
-        let mesh = read_mesh(&path).unwrap();
+        let mesh = read_mesh(&path, &mut Vec::new()).unwrap();
         assert_eq!(mesh.tets, [[0, 1, 2, 3]]);
         assert_eq!(mesh.nodes[3], Vec3::new(0.0, 0.0, 1.0));
         assert_eq!(mesh.region_names, ["tissue"]);
@@ -201,7 +210,7 @@ fn results_carry_their_fields() {
     let u: Vec<f64> = (0..3 * mesh.nodes.len()).map(|k| k as f64).collect();
     let path = scratch("result.vtu");
     write_vtu(&path, &mesh, &mesh.nodes, &[Data { name: "u", components: 3, values: &u }], &[]).unwrap();
-    assert_eq!(read_mesh(&path).unwrap(), mesh);
+    assert_eq!(read_mesh(&path, &mut Vec::new()).unwrap(), mesh);
     write_pvd(&scratch("result.pvd"), &[(0.0, 0, "result.vtu".into()), (0.0, 1, "tool.vtp".into())]).unwrap();
     let index = std::fs::read_to_string(scratch("result.pvd")).unwrap();
     assert!(index.contains("timestep=\"0\" group=\"\" part=\"1\" file=\"tool.vtp\""), "{index}");

@@ -99,7 +99,7 @@ fn nothing_between_the_walls_is_told() {
 #[test]
 fn lower_face_crop_reaches_the_stuffing_row_in_release() {
     let Some(path) = data("cthead_face_bench.nii.gz") else { return };
-    let volume = read_volume(&path).unwrap();
+    let volume = read_volume(&path, &mut Vec::new()).unwrap();
     let start = Instant::now();
     let (skin, bone) = (Distance::to_isosurface(&volume, -300.0), Distance::to_isosurface(&volume, 250.0));
     let fields_s = start.elapsed().as_secs_f64();

@@ -21,7 +21,7 @@ fn mesh(baked: &Baked) -> TetMesh {
 fn entries(baked: &Baked, change: impl FnOnce(&mut TetMesh)) -> usize {
     let mut mesh = mesh(baked);
     change(&mut mesh);
-    let changed = Baked { scene: baked.scene.clone(), mesh: cutis::io::encode(&mesh) };
+    let changed = Baked { scene: baked.scene.clone(), mesh: cutis::io::encode(&mesh), notes: Vec::new() };
     sim(changed.load().expect("a model")).factor_len()
 }
 

@@ -192,6 +192,9 @@ fn read_cells(words: &mut Words, grid: &mut Grid) -> Result<(), IoError> {
         words.word();
         words.need("a number type")?;
         let offsets: Vec<i64> = (0..n).map(|_| words.parse("an offset")).collect::<Result<_, _>>()?;
+        if offsets.first().is_some_and(|&o| o != 0) {
+            return Err(words.slip(&format!("first offset {}", offsets[0]), "0"));
+        }
         grid.offsets = offsets[1.min(offsets.len())..].to_vec();
         if words.need("CONNECTIVITY")? != "CONNECTIVITY" {
             return Err(words.slip("another word", "CONNECTIVITY"));

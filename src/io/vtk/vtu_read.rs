@@ -26,12 +26,11 @@ pub(super) fn read_vtu(bytes: &[u8], path: &Path) -> Result<Grid, IoError> {
     let (head, appended) = split_appended(bytes);
     let text = String::from_utf8_lossy(head);
     let xml_slip = |place: u64, why: String| IoError::format(path, format!("byte {place}"), why, "well-formed XML");
-    let mut reader = Reader::from_str(&text);
+    let mut reader = Reader::from_str(text.trim_start_matches('\u{feff}'));
     let mut file = VtuFile { path, appended, little: true, wide: false, zlib: false, raw: true };
     let mut grid = Grid::default();
-    let mut group = String::new();
-    let mut open: Option<(Attributes, String)> = None;
-    let mut pieces = 0;
+    let mut open = Open::default();
+    let mut pieces = Vec::new();
     loop {
         let event = reader.read_event();
         let place = reader.buffer_position();
@@ -40,55 +39,103 @@ pub(super) fn read_vtu(bytes: &[u8], path: &Path) -> Result<Grid, IoError> {
             Ok(Event::Eof) => break,
             Ok(Event::Start(tag)) => {
                 let with = attributes(&tag).map_err(|e| xml_slip(place, e))?;
-                match tag.name().as_ref() {
+                let name = tag.name().as_ref().to_string();
+                match name.as_str() {
                     "VTKFile" => file.header(&with)?,
-                    "Piece" => pieces += 1,
-                    "DataArray" | "Array" => open = Some((with, String::new())),
+                    "Piece" => pieces.push(with),
+                    name if is_array(name) => open.array = Some((with, String::new())),
                     "AppendedData" => {
                         file.raw = with.get("encoding").is_none_or(|e| e == "raw");
                         break;
                     }
-                    name => group = name.into(),
+                    _ => {}
                 }
+                open.tags.push(name);
             }
             Ok(Event::Empty(tag)) => {
                 let with = attributes(&tag).map_err(|e| xml_slip(place, e))?;
-                if matches!(tag.name().as_ref(), "DataArray" | "Array") {
-                    // The encoding stands at the end of the head: appended arrays are decoded once it is known.
-                    open_appended(&mut grid, &group, with);
+                match tag.name().as_ref() {
+                    "Piece" => pieces.push(with),
+                    name if is_array(name) => {
+                        open.array = Some((with, String::new()));
+                        open.close(&mut grid, &file, &pieces)?;
+                    }
+                    _ => {}
                 }
             }
             Ok(Event::Text(t)) => {
-                if let Some((_, content)) = &mut open {
+                // What stands in an element inside of the array (a key and its values) is about the data, not data.
+                if let Some((_, content)) =
+                    open.array.as_mut().filter(|_| open.tags.last().is_some_and(|t| is_array(t)))
+                {
                     content.push_str(&t.xml10_content());
                 }
             }
-            Ok(Event::End(tag)) if matches!(tag.name().as_ref(), "DataArray" | "Array") => {
-                if let Some((with, content)) = open.take() {
-                    if with.get("format").is_some_and(|f| f == "appended") {
-                        open_appended(&mut grid, &group, with);
-                    } else {
-                        let array = file.array(&with, Some(&content))?;
-                        place_array(&mut grid, &group, array, path)?;
-                    }
+            Ok(Event::End(tag)) => {
+                open.tags.pop();
+                if is_array(tag.name().as_ref()) {
+                    open.close(&mut grid, &file, &pieces)?;
                 }
             }
             Ok(_) => {}
         }
     }
-    if pieces != 1 {
-        let found = format!("{pieces} pieces");
-        return Err(IoError::unsupported(path, found, "merge them into one piece (ParaView: Merge Blocks)"));
-    }
+    let full: Vec<&Attributes> = pieces.iter().filter(|p| !is_empty(p)).collect();
+    let &[piece] = full.as_slice() else {
+        let found = format!("{} pieces", full.len());
+        return Err(IoError::unsupported(
+            path,
+            found,
+            "merge them into one piece (ParaView: Merge Blocks, points merged)",
+        ));
+    };
     for (group, with) in std::mem::take(&mut grid.pending) {
         let array = file.array(&with, None)?;
         place_array(&mut grid, &group, array, path)?;
     }
+    for (key, found) in [("NumberOfPoints", grid.points.len()), ("NumberOfCells", grid.types.len())] {
+        if piece.get(key).is_some_and(|n| n.trim().parse() != Ok(found)) {
+            let wanted = format!("{} as `{key}` says", piece[key]);
+            return Err(IoError::format(path, "the piece", found.to_string(), &wanted));
+        }
+    }
     Ok(grid)
 }
 
-fn open_appended(grid: &mut Grid, group: &str, with: Attributes) {
-    grid.pending.push((group.into(), with));
+fn is_array(tag: &str) -> bool {
+    matches!(tag, "DataArray" | "Array")
+}
+
+fn is_empty(piece: &Attributes) -> bool {
+    piece.get("NumberOfPoints").is_some_and(|n| n.trim() == "0")
+}
+
+/// Where the reader stands.
+#[derive(Default)]
+struct Open {
+    /// Elements that are open, outermost first.
+    tags: Vec<String>,
+    /// The array that is open, and its text.
+    array: Option<(Attributes, String)>,
+}
+
+impl Open {
+    /// Takes in the array that ends here; the innermost open element is its group.
+    fn close(&mut self, grid: &mut Grid, file: &VtuFile, pieces: &[Attributes]) -> Result<(), IoError> {
+        let Some((with, content)) = self.array.take() else { return Ok(()) };
+        let group = self.tags.last().map_or("", String::as_str);
+        let in_piece = self.tags.iter().any(|t| t == "Piece");
+        if in_piece && pieces.last().is_some_and(is_empty) {
+            return Ok(());
+        }
+        if with.get("format").is_some_and(|f| f == "appended") {
+            // The encoding stands at the end of the head: appended arrays are decoded once it is known.
+            grid.pending.push((group.into(), with));
+            return Ok(());
+        }
+        let array = file.array(&with, Some(&content))?;
+        place_array(grid, group, array, file.path)
+    }
 }
 
 /// Head with the opening `AppendedData` tag, and the bytes after its underscore.
@@ -119,6 +166,10 @@ fn place_array(grid: &mut Grid, group: &str, array: Array, path: &Path) -> Resul
         ("PointData", _) => grid.point_data.push(array),
         ("CellData", _) => grid.cell_data.push(array),
         ("Points", _) => {
+            if array.components != 3 {
+                let found = format!("{} components", array.components);
+                return Err(IoError::format(path, "the points", found, "3"));
+            }
             let values: Vec<f64> = match array.values {
                 Values::F64(v) => v,
                 _ => whole(&array)?.into_iter().map(|x| x as f64).collect(),
@@ -165,8 +216,19 @@ impl VtuFile<'_> {
             let found = format!("a VTK file of type `{}`", is("type"));
             return Err(IoError::unsupported(self.path, found, "an UnstructuredGrid of tetrahedra is needed"));
         }
-        self.little = is("byte_order") != "BigEndian";
-        self.wide = is("header_type") == "UInt64";
+        let slip = |key: &str, wanted: &str| {
+            IoError::format(self.path, format!("attribute `{key}` of VTKFile"), format!("`{}`", is(key)), wanted)
+        };
+        self.little = match is("byte_order") {
+            "BigEndian" => false,
+            "LittleEndian" | "" => true,
+            _ => return Err(slip("byte_order", "LittleEndian or BigEndian")),
+        };
+        self.wide = match is("header_type") {
+            "UInt64" => true,
+            "UInt32" | "" => false,
+            _ => return Err(slip("header_type", "UInt32 or UInt64")),
+        };
         self.zlib = match is("compressor") {
             "" => false,
             "vtkZLibDataCompressor" => true,
@@ -174,7 +236,7 @@ impl VtuFile<'_> {
                 return Err(IoError::unsupported(
                     self.path,
                     format!("data compressed by {other}"),
-                    "save it with zlib or none",
+                    "save it with zlib or none (meshio: compression=\"zlib\", ParaView: Compressor Type ZLib)",
                 ));
             }
         };
@@ -184,9 +246,12 @@ impl VtuFile<'_> {
     fn array(&self, with: &Attributes, content: Option<&str>) -> Result<Array, IoError> {
         let get = |key: &str| with.get(key).map_or("", String::as_str);
         let name = get("Name");
-        let components = get("NumberOfComponents").parse().unwrap_or(1);
         let kind = get("type");
         let slip = |found: String, wanted: &str| IoError::format(self.path, format!("array `{name}`"), found, wanted);
+        let components = match get("NumberOfComponents") {
+            "" => 1,
+            n => n.trim().parse().map_err(|_| slip(format!("`{n}` components"), "a number"))?,
+        };
         let values = match (get("format"), content) {
             ("ascii" | "", Some(text)) => {
                 let words = text.split_ascii_whitespace();
@@ -200,6 +265,7 @@ impl VtuFile<'_> {
                     Values::I64(v?)
                 }
             }
+            ("binary", Some(text)) if text.trim_ascii().is_empty() => self.values(kind, &[], name)?,
             ("binary", Some(text)) => self.values(kind, &self.bytes(name, &Source::Base64(text.as_bytes()))?, name)?,
             ("appended", _) => {
                 let offset: usize = get("offset")
@@ -254,10 +320,31 @@ impl VtuFile<'_> {
             read.map_err(|e| IoError::format(self.path, format!("array `{name}`"), e.to_string(), "zlib data"))?;
             at += n;
         }
+        // Blocks are whole but for the last, whose size is the third number, 0 where it is whole, too.
+        let last = if head[2] == 0 { head[1] } else { head[2] };
+        let wanted = (first - 1).saturating_mul(head[1]).saturating_add(last);
+        if out.len() as u64 != wanted {
+            return Err(IoError::truncated(self.path, format!("array `{name}`"), wanted, out.len() as u64));
+        }
         Ok(out)
     }
 
     fn values(&self, kind: &str, bytes: &[u8], name: &str) -> Result<Values, IoError> {
+        let width = match kind.trim_start_matches(|c: char| !c.is_ascii_digit()) {
+            "64" => 8,
+            "32" => 4,
+            "16" => 2,
+            _ => 1,
+        };
+        if bytes.len() % width != 0 {
+            let found = format!("{} bytes", bytes.len());
+            return Err(IoError::format(
+                self.path,
+                format!("array `{name}`"),
+                found,
+                &format!("whole values of type {kind}"),
+            ));
+        }
         let ints = |width: usize, signed: bool| {
             let extend = |v: u64| if signed { (v << (64 - 8 * width)) as i64 >> (64 - 8 * width) } else { v as i64 };
             Values::I64(bytes.chunks_exact(width).map(|b| extend(self.uint(b))).collect())
