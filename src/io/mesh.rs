@@ -33,8 +33,8 @@ pub fn read_mesh(path: &Path, notes: &mut Vec<String>) -> Result<TetMesh, IoErro
     mesh.checked().map_err(broken)
 }
 
-/// Reads a triangle surface, with `notes` as [`read_mesh`]: the triangles of a VTK grid, or the physical surface `skin` of a Gmsh file (all of them if
-/// none has that name). Points that no triangle uses are left out.
+/// Reads a triangle surface: the triangles of a VTK grid, or the physical surface `skin` of a Gmsh file (all of them if
+/// none has that name). Points that no triangle uses are left out; `notes` as for [`read_mesh`].
 ///
 /// # Errors
 /// [`IoError`]: unknown extension, unreadable or malformed file, no triangle in it.
