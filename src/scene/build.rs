@@ -258,7 +258,7 @@ impl Builder<'_> {
             strategy,
             most_solves: most_solves.unwrap_or((pieces * SOLVES).saturating_mul(max_iterations)),
             background,
-            identity: identity(self.text.0),
+            identity: identity(self.text.0)?,
             warnings,
         })?;
         let (dt, end) = match run {
