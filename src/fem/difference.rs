@@ -10,7 +10,7 @@
 //! Source: Hairer, Norsett & Wanner, "Solving Ordinary Differential Equations I", 2nd ed., 1993, section III.5.
 
 /// Steps that grow by more than this start anew: two-step differences lose zero-stability at 1 + sqrt 2.
-pub const LARGEST_GROWTH: f64 = 2.2;
+const LARGEST_GROWTH: f64 = 2.2;
 
 /// Weights of a backward difference.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -19,7 +19,7 @@ mod tet4;
 pub use crate::mesh::Elimination;
 pub use assemble::Assembly;
 pub use curved::{Curving, curve_midsides};
-pub use difference::{Difference, LARGEST_GROWTH};
+pub use difference::Difference;
 pub use dofs::{Configuration, Dofs, RigidBody, Role};
 pub use embedding::{Detached, Embedding};
 pub use locate::{Found, Locator};

@@ -1,7 +1,7 @@
 //! How a host step is cut in time so that each piece keeps an accuracy.
 //!
 //! ```text
-//! next = dt min(1.4, 0.9 (accuracy/error)^(1/k)),   error ~ dt^k
+//! next = dt min(growth, 0.9 (accuracy/error)^(1/k)),   error ~ dt^k
 //! ```
 //!
 //! A piece whose estimated error (`scheme::Formula::error`) is above the accuracy is done again, shorter; one in between is
@@ -13,9 +13,7 @@ use super::model::Inertia;
 
 /// Share of the step that is expected to do which is tried.
 const SAFETY: f64 = 0.9;
-/// A piece grows by this much at most: generalised-alpha stays stable then (`scheme`).
-const GROWTH: f64 = 1.4;
-/// and by this much at least, or not at all.
+/// A piece grows by this much at least, or not at all; at most by what its scheme bears (`Scheme::growth`).
 const WORTHWHILE: f64 = 1.2;
 /// A piece that is done again is cut to between these parts of it.
 const CUT: (f64, f64) = (0.2, 0.9);
@@ -26,6 +24,8 @@ pub(super) struct Pace {
     accuracy: f64,
     /// Exponent of dt in the error.
     k: f64,
+    /// Largest growth of a piece.
+    growth: f64,
 }
 
 impl Pace {
@@ -35,7 +35,11 @@ impl Pace {
     /// Of a scene, if it asks for an accuracy.
     pub fn of(inertia: Option<&Inertia>) -> Option<Pace> {
         let inertia = inertia?;
-        inertia.accuracy.map(|accuracy| Pace { accuracy, k: inertia.scheme.local_order() })
+        inertia.accuracy.map(|accuracy| Pace {
+            accuracy,
+            k: inertia.scheme.local_order(),
+            growth: inertia.scheme.growth(),
+        })
     }
 
     /// Whether an error (m) is as small as asked.
@@ -58,7 +62,7 @@ impl Pace {
         if !self.holds(error) {
             return factor.clamp(CUT.0, CUT.1);
         }
-        if factor < WORTHWHILE { 1.0 } else { GROWTH.min(factor) }
+        if factor < WORTHWHILE { 1.0 } else { self.growth.min(factor) }
     }
 }
 
