@@ -45,6 +45,8 @@ mod rigid;
 mod scenes;
 #[path = "verify/sensitivity.rs"]
 mod sensitivity;
+#[path = "verify/soundness.rs"]
+mod soundness;
 #[path = "verify/sphere.rs"]
 mod sphere;
 #[path = "verify/study.rs"]

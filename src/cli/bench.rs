@@ -28,6 +28,9 @@ pub struct Bench {
 
 impl Bench {
     pub fn run(self) -> super::Done {
+        if let Some(wanted) = self.scene.as_ref().filter(|wanted| !SCENES.iter().any(|s| s.name.contains(*wanted))) {
+            return Err(super::nothing_named("scene", wanted, SCENES.iter().map(|s| s.name)));
+        }
         let largest = SIZES.iter().position(|s| s.name == self.up_to).unwrap_or(SIZES.len() - 1);
         let sizes = &SIZES[..=largest];
         say!(

@@ -35,6 +35,9 @@ impl Check {
             let carries: String = contacts.iter().map(|c| format!(", carries contact {}", c.name)).collect();
             say!("  bone {}: {nodes} nodes, {}{carries}", bone.name, bone.drive);
         }
+        for marker in &model.parts().markers {
+            say!("  marker {}: {:.2} mm from the place asked for", marker.name, 1e3 * marker.off);
+        }
         say!("{:>6}  {:<28} {:<12} {:<6} direction", "ref", "variable", "shape", "unit");
         for p in model.ports() {
             say!("{:>6}  {:<28} {:<12} {:<6} {:?}", p.reference, p.name, format!("{:?}", p.shape), p.unit, p.causality);

@@ -40,7 +40,7 @@ impl Demo {
         let loaded = load::embedded()?;
         let (model, programme) = (&loaded.model, &loaded.programme);
         let skin = skin_mesh(&mut host)?;
-        let mut series = Series::new(&self.out);
+        let mut series = Series::new(&self.out)?;
         let mut x = positions(&mut host)?;
         series.add(0.0, &skin, &[], &x)?;
         let mut panels = vec![("REST", x.clone())];
@@ -54,7 +54,7 @@ impl Demo {
             .map(|p| (p.name.clone(), p.start.clone()))
             .collect();
         for k in 1..=programme.steps() {
-            let t = k as f64 * programme.dt;
+            let (t, dt) = (programme.time(k), programme.step(k));
             for s in programme.settings(t) {
                 let name = &model.ports()[s.port].name;
                 let (_, values) = inputs.iter_mut().find(|(n, _)| n == name).expect("keyframes name inputs");
@@ -64,7 +64,7 @@ impl Demo {
                 host.set_f64(name, values)?;
             }
             let before = Instant::now();
-            host.step(t - programme.dt, programme.dt)?;
+            host.step(t - dt, dt)?;
             let took = before.elapsed();
             spent += took;
             slowest = slowest.max(took);
@@ -107,7 +107,7 @@ impl Demo {
         say!("jaw reaction         {:.2} N when advanced ({:.2}, {:.2}, {:.2})", jaw.norm(), jaw.x, jaw.y, jaw.z);
         say!("residual             {residual:.1e} N");
         say!("smallest det F       {quality:.3}");
-        say!("wrote {}", series.save()?.display());
+        say!("wrote {}", series.index().display());
         let path = self.out.join("picture.png");
         let panels: Vec<(&str, &[Vec3])> = panels.iter().map(|(name, x)| (*name, x.as_slice())).collect();
         io::write_bytes(&path, &picture(&skin, &panels).to_png())?;

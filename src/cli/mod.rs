@@ -27,6 +27,12 @@ use clap::{Parser, Subcommand};
 /// What a command ends with; the message is for a person.
 type Done = Result<(), Box<dyn std::error::Error>>;
 
+/// That no name holds the text that a command was given.
+fn nothing_named<'a>(what: &str, wanted: &str, choices: impl Iterator<Item = &'a str>) -> Box<dyn std::error::Error> {
+    let choices: Vec<String> = choices.map(|c| format!("`{c}`")).collect();
+    format!("no {what} has `{wanted}` in its name, expected a part of {}", choices.join(", ")).into()
+}
+
 /// Soft tissue of the human face: from a head CT to skin that moves in a co-simulation.
 #[derive(Parser)]
 #[command(name = "cutis", version)]

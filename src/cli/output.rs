@@ -3,16 +3,18 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use cutis::io::{Data, write_bytes, write_pvd, write_vtp, write_vtu};
+use cutis::io::{Data, Growing, IoError, remove_files, write_pvd, write_vtp, write_vtu};
 use cutis::math::Vec3;
 use cutis::mesh::{FaceSet, SKIN, TetMesh};
 use cutis::port::{Causality, Port, Type};
 use cutis::sim::{Contact, Model, Sim};
 use cutis::view::{Camera, Image, Rgb, Surface, draw, heat};
 
-/// Columns of the table: time and every varying port but the skin's, elements counted from 1.
+/// A table of ports as CSV: time and every varying port but the skin's. Each row is in the file before the next step begins,
+/// so what was reached is there whatever ends the run.
 pub struct Table {
-    text: String,
+    file: Growing,
+    line: String,
 }
 
 fn columns(sim: &Sim) -> impl Iterator<Item = (usize, &Port)> {
@@ -20,25 +22,36 @@ fn columns(sim: &Sim) -> impl Iterator<Item = (usize, &Port)> {
     sim.model().ports().iter().enumerate().filter(move |(_, p)| wanted(p))
 }
 
-/// `bone.translation[2,1]`.
-pub fn element(port: &Port, k: usize) -> String {
+/// Name of a value of a port: by row and coordinate where they have names, `marker.position.chin.x`, else counted from 1,
+/// `bone.jaw.displacement.17.x`.
+pub fn column(port: &Port, k: usize) -> String {
+    let row = |r: usize| port.rows.get(r).cloned().unwrap_or_else(|| (r + 1).to_string());
+    let coordinate = |c: usize, width: usize| match width {
+        3 => ["x", "y", "z"][c].to_owned(),
+        _ => (c + 1).to_string(),
+    };
     match port.shape.as_slice() {
         [] => port.name.clone(),
-        [_] => format!("{}[{}]", port.name, k + 1),
-        [_, width, ..] => format!("{}[{},{}]", port.name, k / width + 1, k % width + 1),
+        [3] if port.rows.is_empty() => format!("{}.{}", port.name, coordinate(k, 3)),
+        [_] => format!("{}.{}", port.name, row(k)),
+        [_, width, ..] => format!("{}.{}.{}", port.name, row(k / width), coordinate(k % width, *width)),
     }
 }
 
 impl Table {
-    /// The header line.
-    pub fn new(sim: &Sim) -> Table {
-        let names = columns(sim).flat_map(|(_, p)| (0..p.len()).map(|k| format!("\"{}\"", element(p, k))));
-        Table { text: format!("\"time\",{}\n", names.collect::<Vec<_>>().join(",")) }
+    /// Begins the file with its header line.
+    pub fn new(path: &Path, sim: &Sim) -> Result<Table, IoError> {
+        let names = columns(sim).flat_map(|(_, p)| (0..p.len()).map(|k| format!(",{}", column(p, k))));
+        let line = format!("time{}\n", names.collect::<String>());
+        let mut file = Growing::new(path)?;
+        file.append(&line)?;
+        Ok(Table { file, line })
     }
 
-    /// Appends the values now; floats are written so that they read back to the same bits.
-    pub fn row(&mut self, sim: &Sim) {
-        write!(self.text, "{}", sim.time()).expect("writing to memory");
+    /// Appends the values at time `t`; floats are written so that they read back to the same bits.
+    pub fn row(&mut self, t: f64, sim: &Sim) -> Result<(), IoError> {
+        self.line.clear();
+        write!(self.line, "{t}").expect("writing to memory");
         for (k, port) in columns(sim) {
             let values: Vec<String> = match port.ty {
                 Type::Float64 => {
@@ -57,19 +70,14 @@ impl Table {
                     out.iter().map(|b| u8::from(*b).to_string()).collect()
                 }
             };
-            write!(self.text, ",{}", values.join(",")).expect("writing to memory");
+            write!(self.line, ",{}", values.join(",")).expect("writing to memory");
         }
-        self.text.push('\n');
-    }
-
-    /// Writes the table.
-    pub fn save(&self, path: &Path) -> super::Done {
-        write_bytes(path, self.text.as_bytes())?;
-        Ok(())
+        self.line.push('\n');
+        self.file.append(&self.line)
     }
 }
 
-/// A ParaView time series of the whole mesh and of what touches it.
+/// A ParaView time series of the whole mesh and of what touches it. Its index is brought up to date with each frame.
 pub struct Series {
     folder: PathBuf,
     n_frames: usize,
@@ -77,31 +85,46 @@ pub struct Series {
 }
 
 impl Series {
-    pub fn new(folder: &Path) -> Series {
-        Series { folder: folder.into(), n_frames: 0, files: Vec::new() }
+    /// Begins one, and takes what an older one left in the folder away.
+    pub fn new(folder: &Path) -> Result<Series, IoError> {
+        let is_frame = |name: &str| {
+            let stem = name.strip_suffix(".vtu").and_then(|s| s.strip_prefix("step"));
+            let tail = name.strip_suffix(".vtp").map(|s| s.trim_start_matches(|c: char| !c.is_ascii_digit()));
+            [stem, tail].into_iter().flatten().any(|s| s.len() >= 4 && s.bytes().all(|c| c.is_ascii_digit()))
+        };
+        remove_files(folder, is_frame)?;
+        Ok(Series { folder: folder.into(), n_frames: 0, files: Vec::new() })
+    }
+
+    /// The index that ParaView opens.
+    pub fn index(&self) -> PathBuf {
+        self.folder.join("series.pvd")
     }
 
     /// Adds the mesh with its nodes at `x`, and the shapes of contacts that move with these.
     pub fn add(&mut self, t: f64, mesh: &TetMesh, contacts: &[Contact], x: &[Vec3]) -> super::Done {
         let u: Vec<f64> = x.iter().zip(&mesh.nodes).flat_map(|(x, X)| <[f64; 3]>::from(x - X)).collect();
-        let name = format!("step{:04}.vtu", self.n_frames);
         let data = [Data { name: "displacement", components: 3, values: &u }];
-        write_vtu(&self.folder.join(&name), mesh, x, &data, &[])?;
+        // What has no tetrahedra is a surface: the skin, as a host sees it.
+        let name = if mesh.tets.is_empty() {
+            let name = format!("step{:04}.vtp", self.n_frames);
+            let triangles: Vec<[u32; 3]> =
+                mesh.face_sets.iter().flat_map(|set| set.triangles.iter().copied()).collect();
+            write_vtp(&self.folder.join(&name), x, &triangles, &data)?;
+            name
+        } else {
+            let name = format!("step{:04}.vtu", self.n_frames);
+            write_vtu(&self.folder.join(&name), mesh, x, &data, &[])?;
+            name
+        };
         self.files.push((t, 0, name));
         for (part, contact) in (1..).zip(contacts.iter().filter(|c| !c.surface.triangles.is_empty())) {
             let name = format!("{}{:04}.vtp", contact.name, self.n_frames);
-            write_vtp(&self.folder.join(&name), &contact.placed(&mesh.nodes, x), &contact.surface.triangles)?;
+            write_vtp(&self.folder.join(&name), &contact.placed(&mesh.nodes, x), &contact.surface.triangles, &[])?;
             self.files.push((t, part, name));
         }
         self.n_frames += 1;
-        Ok(())
-    }
-
-    /// Writes the index that ParaView opens.
-    pub fn save(&self) -> Result<PathBuf, Box<dyn std::error::Error>> {
-        let path = self.folder.join("series.pvd");
-        write_pvd(&path, &self.files)?;
-        Ok(path)
+        Ok(write_pvd(&self.index(), &self.files)?)
     }
 }
 

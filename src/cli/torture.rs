@@ -19,6 +19,9 @@ impl Torture {
     pub fn run(self) -> super::Done {
         let wanted = self.case.unwrap_or_default();
         let cases = || catalogue().filter(|c| c.name.contains(&wanted));
+        if cases().next().is_none() {
+            return Err(super::nothing_named("case", &wanted, catalogue().map(|c| c.name)));
+        }
         if self.ablate {
             ablate(&cases().collect::<Vec<_>>());
             return Ok(());

@@ -28,6 +28,8 @@ pub enum Volume {
     Quadratic,
     /// U = (ln J)^2/2; +inf for J <= 0.
     Logarithmic,
+    /// U = (J - 1/J)^2/8; +inf for J <= 0.
+    Polyconvex,
 }
 
 impl Volume {
@@ -35,7 +37,11 @@ impl Volume {
     fn U(self, J: f64) -> [f64; 3] {
         match self {
             Volume::Linear | Volume::Quadratic => [0.5 * (J - 1.0) * (J - 1.0), J - 1.0, 1.0],
-            Volume::Logarithmic if J <= 0.0 => [f64::INFINITY, 0.0, 0.0],
+            Volume::Logarithmic | Volume::Polyconvex if J <= 0.0 => [f64::INFINITY, 0.0, 0.0],
+            Volume::Polyconvex => {
+                let (swollen, cubed) = (J - 1.0 / J, J.powi(3));
+                [0.125 * swollen * swollen, 0.25 * (J - 1.0 / cubed), 0.25 * (1.0 + 3.0 / (cubed * J))]
+            }
             Volume::Logarithmic => {
                 let l = J.ln();
                 [0.5 * l * l, l / J, (1.0 - l) / (J * J)]

@@ -70,6 +70,17 @@ impl Shape {
         surface
     }
 
+    /// Points of its line, no further apart than its radius, m; none for a half-space.
+    pub fn axis(&self) -> Vec<Vec3> {
+        let Shape::Tube { path, radius } = self else { return Vec::new() };
+        let mut points = vec![path[0]];
+        for ends in path.windows(2) {
+            let n = ((ends[1] - ends[0]).norm() / radius).ceil().max(1.0);
+            points.extend((1..=n as usize).map(|k| ends[0] + k as f64 / n * (ends[1] - ends[0])));
+        }
+        points
+    }
+
     /// A point in its middle, m.
     pub fn middle(&self) -> Vec3 {
         match self {

@@ -4,8 +4,8 @@ use super::nodal_pressure::Volume;
 use super::tuned::{Tuned, Tuning};
 use super::viscous::{Measure, Viscous};
 use crate::energy::{
-    Corotational, Energy, Fung, Isochoric, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, Principal, StVenantKirchhoff,
-    StableNeoHookean, Stretches, VerondaWestmann, WithBulk, Yeoh,
+    Corotational, Energy, Fung, Isochoric, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, PolyconvexNeoHookean,
+    Principal, StVenantKirchhoff, StableNeoHookean, Stretches, VerondaWestmann, WithBulk, Yeoh,
 };
 use crate::fem::{Elastic, Material, OnElements, Solid, TET4_PLACES, TET10_PLACES, Term, tet4_points, tet10_points};
 use crate::math::Vec3;
@@ -216,6 +216,15 @@ pub const LAWS: &[Law] = &[
         |c, t| term(StableNeoHookean(lame(c)), t),
         |c, t, s| tuned(StableNeoHookean(lame(c)), t, s),
     ),
+    Law {
+        volume: Volume::Polyconvex,
+        ..in_e_nu(
+            PolyconvexNeoHookean::NAME,
+            |c| material(PolyconvexNeoHookean(lame(c))),
+            |c, t| term(PolyconvexNeoHookean(lame(c)), t),
+            |c, t, s| tuned(PolyconvexNeoHookean(lame(c)), t, s),
+        )
+    },
     Law {
         volume: Volume::Logarithmic,
         ..in_e_nu(

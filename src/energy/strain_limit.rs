@@ -1,12 +1,12 @@
 //! Strain limits: silent between two stretches, steep beyond them.
 //!
 //! ```text
-//! psi = k w^2 sum_i [e(y_i) + e(z_i)],   y_i = (s_i - longest)/w + 1,   z_i = (shortest - s_i)/w + 1
+//! psi = k w^2 sum_i [e(y_i) + e(z_i)],   y_i = (s_i - longest)/w + 3,   z_i = (shortest - s_i)/w + 3,   w = band/3
 //! e(y) = 0 for y <= 0,   exp(y) - 1 - y - y^2/2 up to y = 6,   from there on the parabola that touches it
 //! ```
 //!
-//! `w` is the band over which the limit sets in: it ends at the limit, and a stress of `k w` meets tissue that is about
-//! there. It is C2, zero inside, and finite everywhere, so a motion that breaks the limit still has an answer. At
+//! The limit sets in over its band, which ends at the limit; there the stress is 5 k band, and it grows by e with each third
+//! of a band beyond. It is C2, zero inside, and finite everywhere, so a motion that breaks the limit still has an answer. At
 //! equilibrium each element passes on to its neighbours exactly what it cannot take.
 //!
 //! Source: the limits are those of Provot, "Deformation constraints in a mass-spring model", Graphics Interface, 1995, on
@@ -18,6 +18,8 @@ use crate::math::{Mat3, Vec3};
 
 /// Where the exponential gives way to a parabola, in bands.
 const STEEPEST: f64 = 6.0;
+/// Widths w in a band.
+const WIDTHS: f64 = 3.0;
 
 /// Limits of the principal stretches.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +47,12 @@ fn wall(y: f64) -> [f64; 3] {
 
 impl StrainLimit {
     fn walls(&self, s: f64) -> [[f64; 3]; 2] {
-        [wall((s - self.longest) / self.band + 1.0), wall((self.shortest - s) / self.band + 1.0)]
+        let w = self.width();
+        [wall((s - self.longest) / w + WIDTHS), wall((self.shortest - s) / w + WIDTHS)]
+    }
+
+    fn width(&self) -> f64 {
+        self.band / WIDTHS
     }
 }
 
@@ -54,12 +61,12 @@ impl Principal for StrainLimit {
 
     fn psi(&self, s: &Vec3) -> f64 {
         let of = |s: &f64| self.walls(*s).iter().map(|e| e[0]).sum::<f64>();
-        self.stiffness * self.band * self.band * s.iter().map(of).sum::<f64>()
+        self.stiffness * self.width().powi(2) * s.iter().map(of).sum::<f64>()
     }
     fn first(&self, s: &Vec3) -> Vec3 {
         s.map(|s| {
             let [long, short] = self.walls(s);
-            self.stiffness * self.band * (long[1] - short[1])
+            self.stiffness * self.width() * (long[1] - short[1])
         })
     }
     fn second(&self, s: &Vec3) -> Mat3 {

@@ -12,6 +12,7 @@
 //! The mesh alone decides, so that a baked mesh and the CT head are curved like the synthetic one.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use super::quadratic::EDGES;
 use super::tet10::{NODES, TET10_PLACES, jacobian};
@@ -33,9 +34,13 @@ pub struct Curving {
     pub straightened: usize,
 }
 
-/// The triangles beside an edge in one face set: its ends, how many there are, their normals.
+/// Triangles beside an edge by their corners, ascending.
+type Beside = Vec<[u32; 3]>;
+
+/// The triangles beside an edge in one face set: its ends, the triangles, their normals.
 struct Edge {
     ends: [u32; 2],
+    beside: Beside,
     normals: Vec<Vec3>,
 }
 
@@ -44,11 +49,22 @@ struct Edge {
 /// `midsides` are those that `add_midsides` returned for this mesh, whose face sets are cut in four accordingly.
 pub fn curve_midsides(mesh: &mut TetMesh, midsides: &[[u32; 6]]) -> Curving {
     let chord = |[a, b]: [u32; 2]| 0.5 * (mesh.nodes[a as usize] + mesh.nodes[b as usize]);
-    let mut target: HashMap<u32, Option<Vec3>> = HashMap::new();
-    for set in &mesh.face_sets {
-        for (middle, offset) in offsets(mesh, &set.triangles) {
-            // An edge of two surfaces is a rim of both.
-            target.entry(middle).and_modify(|t| *t = None).or_insert(offset);
+    let mut target: HashMap<u32, (Beside, Option<Vec3>)> = HashMap::new();
+    // A face may lie in two sets, one of which holds the other: the larger one knows the surface beyond the smaller one's rim.
+    let mut sets: Vec<&[[u32; 3]]> = mesh.face_sets.iter().map(|set| &set.triangles[..]).collect();
+    sets.sort_by_key(|triangles| std::cmp::Reverse(triangles.len()));
+    for triangles in sets {
+        for (middle, beside, offset) in offsets(mesh, triangles) {
+            match target.entry(middle) {
+                Entry::Vacant(entry) => {
+                    entry.insert((beside, offset));
+                }
+                // An edge of two surfaces is a rim of both.
+                Entry::Occupied(mut entry) if !beside.iter().all(|t| entry.get().0.contains(t)) => {
+                    entry.get_mut().1 = None;
+                }
+                Entry::Occupied(_) => {}
+            }
         }
     }
     let mut ends: HashMap<u32, [u32; 2]> = HashMap::new();
@@ -56,9 +72,9 @@ pub fn curve_midsides(mesh: &mut TetMesh, midsides: &[[u32; 6]]) -> Curving {
         ends.extend(six.iter().zip(EDGES).map(|(&m, [i, j])| (m, [tet[i], tet[j]])));
     }
     let mut moved: Vec<u32> =
-        target.iter().filter(|(m, t)| t.is_some() && ends.contains_key(m)).map(|t| *t.0).collect();
+        target.iter().filter(|(m, t)| t.1.is_some() && ends.contains_key(m)).map(|t| *t.0).collect();
     moved.sort_unstable();
-    let places: Vec<Vec3> = moved.iter().map(|m| chord(ends[m]) + target[m].expect("kept above")).collect();
+    let places: Vec<Vec3> = moved.iter().map(|m| chord(ends[m]) + target[m].1.expect("kept above")).collect();
     moved.iter().zip(places).for_each(|(&m, x)| mesh.nodes[m as usize] = x);
 
     let mut straightened = 0;
@@ -80,8 +96,9 @@ pub fn curve_midsides(mesh: &mut TetMesh, midsides: &[[u32; 6]]) -> Curving {
     }
 }
 
-/// For each mid-edge node of a face set how far its surface lies from the chord; `None` at rims and creases.
-fn offsets(mesh: &TetMesh, triangles: &[[u32; 3]]) -> Vec<(u32, Option<Vec3>)> {
+/// For each mid-edge node of a face set the triangles beside it, and how far its surface lies from the chord; `None` at rims
+/// and creases.
+fn offsets(mesh: &TetMesh, triangles: &[[u32; 3]]) -> Vec<(u32, Beside, Option<Vec3>)> {
     let x = |a: u32| mesh.nodes[a as usize];
     let mut normal: HashMap<u32, Vec3> = HashMap::new();
     let mut edges: Vec<(u32, Edge)> = Vec::new();
@@ -95,9 +112,12 @@ fn offsets(mesh: &TetMesh, triangles: &[[u32; 3]]) -> Vec<(u32, Option<Vec3>)> {
             let flat = e1.cross(&e2);
             *normal.entry(a).or_default() += flat / (e1.norm_squared() * e2.norm_squared());
             let at = *index.entry(middles[k]).or_insert_with(|| {
-                edges.push((middles[k], Edge { ends: [a, b], normals: Vec::new() }));
+                edges.push((middles[k], Edge { ends: [a, b], beside: Vec::new(), normals: Vec::new() }));
                 edges.len() - 1
             });
+            let mut key = corners;
+            key.sort_unstable();
+            edges[at].1.beside.push(key);
             edges[at].1.normals.push(flat.normalize());
         }
     }
@@ -110,7 +130,13 @@ fn offsets(mesh: &TetMesh, triangles: &[[u32; 3]]) -> Vec<(u32, Option<Vec3>)> {
         let d = x(b) - x(a);
         smooth.then(|| (d.dot(&n_b) * n_b - d.dot(&n_a) * n_a) / 8.0)
     };
-    edges.iter().map(|(middle, edge)| (*middle, offset(edge))).collect()
+    edges
+        .into_iter()
+        .map(|(middle, edge)| {
+            let offset = offset(&edge);
+            (middle, edge.beside, offset)
+        })
+        .collect()
 }
 
 /// Whether an element's Jacobian falls too far at its nodes or points of integration.

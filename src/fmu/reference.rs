@@ -41,13 +41,14 @@ pub(super) fn run(model: Arc<Model>, programme: &Programme) -> Result<Run, SimEr
     };
     let mut run = Run { inputs: header(&sim, set), outputs: header(&sim, told) };
     for k in 0..=STEPS.min(programme.steps()) {
-        for s in programme.settings(k as f64 * programme.dt) {
+        let t = if k == 0 { 0.0 } else { programme.time(k) };
+        for s in programme.settings(t) {
             sim.set_f64(s.port, s.offset, &s.values)?;
         }
         if k == 0 {
             sim.initialise()?;
         } else {
-            sim.step(programme.dt)?;
+            sim.step(programme.step(k))?;
         }
         run.inputs += &row(&sim, set)?;
         run.outputs += &row(&sim, told)?;

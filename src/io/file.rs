@@ -1,6 +1,8 @@
 //! Plain files and folders.
 
-use std::path::Path;
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
 
 use super::IoError;
 
@@ -45,12 +47,25 @@ pub fn remove_file(path: &Path) -> Result<(), IoError> {
     std::fs::remove_file(path).map_err(IoError::file(path))
 }
 
-/// Writes a file, replacing an older one.
-///
-/// # Errors
-/// [`IoError::File`].
+/// Writes a file, replacing an older one: whole or not at all.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), IoError> {
-    std::fs::write(path, bytes).map_err(IoError::file(path))
+    let Some(name) = path.file_name().filter(|_| !is_special(path)) else {
+        return std::fs::write(path, bytes).map_err(IoError::file(path));
+    };
+    let mut part = name.to_owned();
+    part.push(".part");
+    let part = path.with_file_name(part);
+    let written = std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path));
+    written.map_err(|source| {
+        // What is half-written would pass for a file.
+        let _ = std::fs::remove_file(&part);
+        IoError::file(path)(source)
+    })
+}
+
+/// Whether something other than a file stands there, that a file must not take the place of: a pipe, a link, a device.
+fn is_special(path: &Path) -> bool {
+    std::fs::symlink_metadata(path).is_ok_and(|m| !m.is_file())
 }
 
 /// Makes a folder and those above it, if they are not there.
@@ -59,4 +74,32 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), IoError> {
 /// [`IoError::File`].
 pub fn create_folder(path: &Path) -> Result<(), IoError> {
     std::fs::create_dir_all(path).map_err(IoError::file(path))
+}
+
+/// A file that grows: what was appended is there whatever comes after.
+pub struct Growing {
+    path: PathBuf,
+    file: File,
+}
+
+impl Growing {
+    /// An empty file, in place of an older one.
+    pub fn new(path: &Path) -> Result<Growing, IoError> {
+        Ok(Growing { path: path.into(), file: File::create(path).map_err(IoError::file(path))? })
+    }
+
+    /// Appends `text`.
+    pub fn append(&mut self, text: &str) -> Result<(), IoError> {
+        self.file.write_all(text.as_bytes()).map_err(IoError::file(&self.path))
+    }
+}
+
+/// Removes the files of a folder whose names are like `unwanted`.
+pub fn remove_files(folder: &Path, unwanted: impl Fn(&str) -> bool) -> Result<(), IoError> {
+    for entry in std::fs::read_dir(folder).map_err(IoError::file(folder))?.flatten() {
+        if entry.file_name().to_str().is_some_and(&unwanted) {
+            std::fs::remove_file(entry.path()).map_err(IoError::file(&entry.path()))?;
+        }
+    }
+    Ok(())
 }

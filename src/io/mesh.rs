@@ -75,7 +75,7 @@ pub fn write_mesh(path: &Path, mesh: &TetMesh) -> Result<(), IoError> {
         "msh" => gmsh::text(mesh, path)?.into_bytes(),
         _ => return Err(IoError::Extension { path: path.into(), choices: CHOICES }),
     };
-    std::fs::write(path, bytes).map_err(IoError::file(path))
+    super::write_bytes(path, &bytes)
 }
 
 /// Whether [`write_mesh`] could write here: a known extension, a folder that is there, a place that may be written.

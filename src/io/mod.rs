@@ -20,7 +20,7 @@ mod vtk;
 pub use baked::{decode, encode};
 pub use ct::{read_labels, read_volume};
 pub use error::IoError;
-pub use file::{create_folder, read_bytes, read_text, remove_file, rename, write_bytes};
+pub use file::{Growing, create_folder, read_bytes, read_text, remove_file, remove_files, rename, write_bytes};
 pub use labels::LabelMap;
 pub use mesh::{check_mesh_target, read_mesh, read_surface, write_mesh};
 pub use vtk::{Data, write_pvd, write_vtp, write_vtu};

@@ -12,7 +12,7 @@ mod vtu_write;
 
 use std::path::Path;
 
-use super::IoError;
+use super::{IoError, write_bytes};
 use crate::math::Vec3;
 use crate::mesh::{FineSkin, TetMesh};
 
@@ -63,15 +63,18 @@ pub fn write_vtu(
     point_data: &[Data],
     cell_data: &[Data],
 ) -> Result<(), IoError> {
-    std::fs::write(path, vtu_bytes(mesh, x, point_data, cell_data)).map_err(IoError::file(path))
+    write_bytes(path, &vtu_bytes(mesh, x, point_data, cell_data))
 }
 
-/// Writes a triangle surface as `.vtp`.
+/// Writes a triangle surface as `.vtp`, with fields on its vertices.
 ///
 /// # Errors
 /// [`IoError::File`] when the file cannot be written.
-pub fn write_vtp(path: &Path, vertices: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), IoError> {
-    std::fs::write(path, vtp_write::vtp_text(vertices, triangles)).map_err(IoError::file(path))
+///
+/// # Panics
+/// When a field is not as long as the vertices ask.
+pub fn write_vtp(path: &Path, vertices: &[Vec3], triangles: &[[u32; 3]], point_data: &[Data]) -> Result<(), IoError> {
+    write_bytes(path, vtp_write::vtp_text(vertices, triangles, point_data).as_bytes())
 }
 
 /// Writes the `.pvd` index of a time series: time in s, part (from 0) and file name (relative to the index) of each file.
@@ -87,5 +90,5 @@ pub fn write_pvd(path: &Path, files: &[(f64, usize, String)]) -> Result<(), IoEr
         out += &format!("<DataSet timestep=\"{t}\" group=\"\" part=\"{part}\" file=\"{file}\"/>\n");
     }
     out += "</Collection>\n</VTKFile>\n";
-    std::fs::write(path, out).map_err(IoError::file(path))
+    write_bytes(path, out.as_bytes())
 }

@@ -8,7 +8,7 @@ use super::file::BoneSpec;
 use crate::math::Vec3;
 use crate::mesh::TetMesh;
 use crate::port::Slot;
-use crate::sim::{self, Bone, Drive, Layout};
+use crate::sim::{Bone, Drive, Layout};
 
 /// Says that no tissue sticks to a bone: it carries the shape of a contact only.
 const NO_NODES: &str = "none";
@@ -170,19 +170,61 @@ pub(super) fn wants_no_nodes(spec: &BoneSpec) -> bool {
     spec.nodes.as_ref().is_some_and(|nodes| nodes.get_ref() == NO_NODES)
 }
 
-/// Takes bone nodes within `rings` edges of another bone off their bone.
+/// Takes bone nodes within `rings` edges of another bone off their bone. Edges are counted through tissue and bone alike, from
+/// where the bones were before any was set free.
 pub(super) fn free_rings(mesh: &TetMesh, bones: &mut [Bone], rings: u32, warnings: &mut Vec<String>) {
+    let neighbours = neighbours(mesh);
+    let near = |other: usize| within_edges(&neighbours, bones, other, rings);
+    let near: Vec<Vec<bool>> = (0..bones.len()).map(near).collect();
     let mut freed = 0;
-    for _ in 0..rings {
-        let mut near: Vec<u32> = sim::osteotomy_edges(mesh, bones).into_iter().flat_map(|(a, b)| [a, b]).collect();
-        near.sort_unstable();
-        near.dedup();
-        freed += near.len();
-        for bone in bones.iter_mut() {
-            bone.nodes.retain(|a| near.binary_search(a).is_err());
+    for (b, bone) in bones.iter_mut().enumerate() {
+        let had = bone.nodes.len();
+        bone.nodes.retain(|&a| !near[b][a as usize]);
+        freed += had - bone.nodes.len();
+        if bone.nodes.is_empty() && had > 0 {
+            warnings.push(format!(
+                "all {had} nodes of bone `{}` lie within {rings} edge(s) of another bone and were set free: it holds nothing",
+                bone.name
+            ));
         }
     }
     if freed > 0 {
         warnings.push(format!("{freed} bone node(s) next to another bone were set free (free_rings = {rings})"));
     }
+}
+
+/// Nodes within `rings` edges of any bone but `own`.
+fn within_edges(neighbours: &[Vec<u32>], bones: &[Bone], own: usize, rings: u32) -> Vec<bool> {
+    let mut reached = vec![false; neighbours.len()];
+    let others = bones.iter().enumerate().filter(|(b, _)| *b != own);
+    let mut front: Vec<u32> = others.flat_map(|(_, bone)| bone.nodes.iter().copied()).collect();
+    front.iter().for_each(|&a| reached[a as usize] = true);
+    for _ in 0..rings {
+        let mut next = Vec::new();
+        for &b in front.iter().flat_map(|&a| &neighbours[a as usize]) {
+            if !std::mem::replace(&mut reached[b as usize], true) {
+                next.push(b);
+            }
+        }
+        if next.is_empty() {
+            break;
+        }
+        front = next;
+    }
+    reached
+}
+
+/// Nodes that share a tetrahedron with each node.
+fn neighbours(mesh: &TetMesh) -> Vec<Vec<u32>> {
+    let mut neighbours = vec![Vec::new(); mesh.nodes.len()];
+    for tet in &mesh.tets {
+        for &a in tet {
+            neighbours[a as usize].extend(tet.iter().copied().filter(|b| *b != a));
+        }
+    }
+    for list in &mut neighbours {
+        list.sort_unstable();
+        list.dedup();
+    }
+    neighbours
 }

@@ -10,6 +10,7 @@ use super::programme::Programme;
 use super::tables::identity;
 use crate::effect::{Gravity, Inertia, lumped_masses};
 use crate::fem::{Curving, Embedding, add_midsides, curve_midsides};
+use crate::math::Vec3;
 use crate::mesh::{SKIN, TetMesh};
 use crate::port::Slot;
 use crate::sim::{self, Drive, Layout, Marker, Model, ModelParts, Scheme};
@@ -125,8 +126,8 @@ impl Builder<'_> {
         let first_of_contacts = mesh.nodes.len() as u32;
         let mut contacts = Vec::new();
         for (name, bone, contact) in self.contacts(file, &mut mesh, &mut bones, &mut n_history, &mut warnings)? {
-            let (reach, surface) = (contact.shape.reach(), contact.shape.surface());
-            contacts.push(sim::Contact { name, bone, frame: contact.frame, term: terms.len(), reach, surface });
+            let (reach, surface, axis) = (contact.shape.reach(), contact.shape.surface(), contact.shape.axis());
+            contacts.push(sim::Contact { name, bone, frame: contact.frame, term: terms.len(), reach, surface, axis });
             terms.push(Box::new(contact));
         }
         let counts: Vec<(Drive, usize)> = bones.iter().map(|b| (b.drive, b.nodes.len())).collect();
@@ -196,8 +197,12 @@ impl Builder<'_> {
         for m in marker {
             let at = self.text.vector("marker", "at", &m.at)?;
             let (nodes, weights) = nearest_point(skin.0, skin.1, &at).ok_or_else(|| self.text.no_skin(&m.name))?;
-            markers.push(Marker { name: m.name.get_ref().clone(), nodes, weights });
+            let found: Vec3 = nodes.iter().zip(weights).map(|(&a, w)| w * skin.0[a as usize]).sum();
+            markers.push(Marker { name: m.name.get_ref().clone(), nodes, weights, off: (found - at).norm() });
         }
+        let end = run.as_ref().map(|run| self.text.number("run", "end", &run.end)).transpose()?.flatten();
+        let end = end.unwrap_or(1.0);
+        warnings.extend(self.implausible(file, &mesh, &markers, end));
         let spec = solver.as_ref();
         let newton =
             spec.map(|s| self.text.choice("solver", "method", &s.method)).transpose()?.flatten() == Some("newton");
@@ -258,15 +263,12 @@ impl Builder<'_> {
             strategy,
             most_solves: most_solves.unwrap_or((pieces * SOLVES).saturating_mul(max_iterations)),
             background,
-            identity: identity(self.text.0)?,
+            identity: identity(self.text.0),
             warnings,
         })?;
-        let (dt, end) = match run {
-            Some(run) => (self.text.number("run", "dt", &run.dt)?, self.text.number("run", "end", &run.end)?),
-            None => (None, None),
-        };
+        let dt = run.as_ref().map(|run| self.text.number("run", "dt", &run.dt)).transpose()?.flatten();
         let tracks = self.tracks(file, model.ports())?;
-        Ok((model, Programme { dt: dt.unwrap_or(0.1), end: end.unwrap_or(1.0), tracks }))
+        Ok((model, Programme { dt: dt.unwrap_or(0.1), end, tracks }))
     }
 }
 

@@ -350,6 +350,37 @@ impl SceneFile {
     /// # Errors
     /// [`SceneError::Syntax`] with line, column and choices.
     pub fn parse(text: &str) -> Result<SceneFile, SceneError> {
-        toml::from_str(text).map_err(|e| SceneError::Syntax(e.to_string().trim_end().to_owned()))
+        toml::from_str(text).map_err(|e| SceneError::Syntax(plain(e.to_string().trim_end())))
     }
+}
+
+/// The message of the parser in words of a scene instead of those of the program's types.
+fn plain(message: &str) -> String {
+    const WORDS: [(&str, &str); 15] = [
+        (
+            "data did not match any variant of untagged enum Constant",
+            "wanted a number, or an array of numbers for `ogden`",
+        ),
+        ("expected a sequence", "wanted an array"),
+        ("expected a map", "wanted a table"),
+        ("expected an array of length", "wanted an array of"),
+        ("expected a tuple of size", "wanted an array of"),
+        ("expected f64", "wanted a number"),
+        ("expected u32", "wanted a whole number, zero or more"),
+        ("expected usize", "wanted a whole number, zero or more"),
+        ("expected a string", "wanted text in quotes"),
+        ("expected a boolean", "wanted true or false"),
+        ("invalid type: floating point ", "found the number "),
+        ("invalid type: integer ", "found the whole number "),
+        ("invalid type: string ", "found the text "),
+        ("invalid type: ", "found a "),
+        ("invalid length ", "found an array of "),
+    ];
+    let mut text = WORDS.iter().fold(message.to_owned(), |text, (theirs, ours)| text.replace(theirs, ours));
+    // What is left names a type: a table of the scene.
+    while let Some(at) = text.find("expected struct ") {
+        let end = text[at + 16..].find(|c: char| !c.is_alphanumeric()).map_or(text.len(), |n| at + 16 + n);
+        text.replace_range(at..end, "wanted a table");
+    }
+    text
 }

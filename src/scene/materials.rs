@@ -17,6 +17,10 @@ use crate::sim::MOST_TUNABLE;
 
 /// Above this Poisson's ratio linear tetrahedra lock visibly.
 const LOCKING_NU: f64 = 0.45;
+/// What is lost of a Poisson's ratio on its way through Lame's constants.
+const ROUND_OFF: f64 = 1e-9;
+/// The law of a tissue that the scene says nothing of: of those in E and nu the one that bears most.
+const DEFAULT_LAW: &str = "polyconvex-neo-hookean";
 /// Density of tissue that the scene says nothing of, kg/m3.
 const WATER: f64 = 1000.0;
 
@@ -123,7 +127,13 @@ impl Builder<'_> {
         }
         let mut tunable = Vec::new();
         for (k, spec) in file.tissue.iter().enumerate() {
-            let spec = &self.with_preset(spec)?;
+            let from_preset = spec.pressure.is_none();
+            let spec = &mut self.with_preset(spec)?;
+            // A preset says what linear tetrahedra need; quadratic ones do not.
+            if from_preset && !midsides.is_empty() {
+                spec.pressure = None;
+            }
+            let spec = &*spec;
             let mine = |r: u32| material[r as usize] == k;
             if let Some(E) = self.springs(spec, midsides.is_empty())? {
                 if let Some(tunable) = &spec.tunable {
@@ -148,7 +158,7 @@ impl Builder<'_> {
             });
             let rho = self.text.number("tissue", "density", &spec.density)?.unwrap_or(WATER);
             let nodal = spec.pressure.as_ref().is_some_and(|p| p.get_ref() == "nodal");
-            if nu > LOCKING_NU && midsides.is_empty() && !nodal {
+            if nu > LOCKING_NU + ROUND_OFF && midsides.is_empty() && !nodal {
                 warnings.push(format!(
                     "Poisson's ratio {nu:.4} on linear tetrahedra: above {LOCKING_NU} they lock, so motions come out too \
                      small and forces too large; pressure = \"nodal\" in its [[tissue]] (fast) or [mesh] order = 2 \
@@ -182,7 +192,7 @@ impl Builder<'_> {
 
     /// The law of a material and its constants, in the law's order.
     pub(super) fn law(&self, spec: &TissueSpec) -> Result<(&'static Law, Vec<Vec<f64>>), SceneError> {
-        let name = self.text.choice("tissue", "energy", &spec.energy)?.unwrap_or("stable-neo-hookean");
+        let name = self.text.choice("tissue", "energy", &spec.energy)?.unwrap_or(DEFAULT_LAW);
         let law = effect::law(name).expect("keys list the catalogue's laws");
         let wants = || law.keys.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
         let mut constants: Vec<Vec<f64>> = vec![Vec::new(); law.keys.len()];

@@ -15,6 +15,7 @@ mod keys;
 mod loads;
 mod materials;
 mod place;
+mod plausible;
 mod presets;
 mod programme;
 mod reduction;

@@ -5,6 +5,9 @@ use super::build::Builder;
 use super::file::SceneFile;
 use crate::port::{Causality, Port};
 
+/// Part of a programme that is no step of its own.
+const ROUND_OFF: f64 = 1e-9;
+
 /// Values over time for one row (or all) of one input port.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
@@ -38,9 +41,20 @@ pub struct Programme {
 }
 
 impl Programme {
-    /// Number of steps: `end / dt`, rounded.
+    /// Number of steps to the end; the last one is shorter where `dt` does not divide it.
     pub fn steps(&self) -> usize {
-        (self.end / self.dt).round().max(1.0) as usize
+        (self.end / self.dt * (1.0 - ROUND_OFF)).ceil().max(1.0) as usize
+    }
+
+    /// When step `k`, counted from 1, ends, s: k dt, not a sum of steps.
+    pub fn time(&self, k: usize) -> f64 {
+        if k < self.steps() { k as f64 * self.dt } else { self.end }
+    }
+
+    /// Length of step `k`, counted from 1, s: `dt` but for a last one that is shorter.
+    pub fn step(&self, k: usize) -> f64 {
+        let rest = self.end - (k - 1) as f64 * self.dt;
+        if k == self.steps() && (rest - self.dt).abs() > ROUND_OFF * self.end { rest } else { self.dt }
     }
 
     /// What to set before the step that ends at time `t`.
@@ -103,6 +117,11 @@ impl Builder<'_> {
             let values = values.ok_or_else(|| {
                 self.text.at(frame.value.span().start, format!("`value` must be {len} finite number(s) for `{wanted}`"))
             })?;
+            let (low, high) = (p.min.unwrap_or(f64::NEG_INFINITY), p.max.unwrap_or(f64::INFINITY));
+            if let Some(bad) = values.iter().find(|v| !(low..=high).contains(*v)) {
+                let message = format!("`value` of `{wanted}` is {bad} {}; it takes {low} to {high}", p.unit);
+                return Err(self.text.at(frame.value.span().start, message));
+            }
             let t = self.text.checked("keyframe", "t", &frame.t)?;
             let same =
                 |track: &&mut Track| track.port == port && track.offset == offset && track.frames[0].1.len() == len;
@@ -119,7 +138,7 @@ impl Builder<'_> {
     }
 }
 
-fn numbers(value: &toml::Value) -> Option<Vec<f64>> {
+pub(super) fn numbers(value: &toml::Value) -> Option<Vec<f64>> {
     match value {
         toml::Value::Float(v) => Some(vec![*v]),
         toml::Value::Integer(v) => Some(vec![*v as f64]),

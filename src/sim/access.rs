@@ -21,14 +21,12 @@ impl Sim {
         Ok(())
     }
 
-    /// Whether [`Sim::set_f64`] would take these values, and [`Sim::initialise`] after it if that is yet to come.
+    /// Whether [`Sim::set_f64`] would take these values.
     ///
     /// # Errors
-    /// As for [`Sim::set_f64`], and [`SimError::NotAtRest`].
+    /// The same.
     pub fn check_f64(&self, port: usize, offset: usize, values: &[f64]) -> Result<(), SimError> {
-        let first = self.settable(port, offset, values)?;
-        let moved = (first..).zip(values).filter(|(_, value)| **value != 0.0);
-        moved.map(|(k, _)| k).try_for_each(|k| self.check_start(self.model.ports()[port].slot, k))
+        self.settable(port, offset, values).map(drop)
     }
 
     /// Where the values go among the inputs.
@@ -41,6 +39,7 @@ impl Sim {
         let first = first + offset;
         for (k, &value) in (first..).zip(values).filter(|(_, value)| **value != 0.0) {
             bone_of_input(&self.model, k, value)?;
+            self.check_start(p.slot, k)?;
         }
         Ok(first)
     }

@@ -12,6 +12,7 @@ use super::pace::even_part;
 use super::step::place_bones;
 use crate::fem::{At, Configuration};
 use crate::math::Vec3;
+use crate::mesh::signed_volume;
 use crate::solve::SolveError;
 
 /// How far a shape may go at once, and how deep tissue may lie in it, in units of its reach.
@@ -102,13 +103,44 @@ impl Approach<'_> {
     }
 }
 
-/// Refuses tissue at `x` that lies deeper in a shape than it can tell its sides.
-pub(super) fn check_depth(model: &Model, x: &[Vec3]) -> Result<(), SolveError> {
+/// Refuses tissue at `x` that lies deeper in a shape than it can tell its sides, and shapes whose middle lies in tissue that it
+/// did not lie in `before`: the surface that it should have pushed away is behind it then.
+pub(super) fn check_depth(model: &Model, before: &[Vec3], x: &[Vec3]) -> Result<(), SolveError> {
     for (k, Contact { name, reach, .. }) in model.parts().contacts.iter().enumerate() {
         let (depth, most) = (model.touch(k, &At::NOWHERE, x).depth(), SAFE * reach);
         if depth > most {
             return Err(SolveError::TooDeep { contact: name.clone(), depth, most });
         }
+        if is_swallowed(model, k, x) && !is_swallowed(model, k, before) {
+            return Err(SolveError::Swallowed { contact: name.clone() });
+        }
     }
     Ok(())
+}
+
+/// Whether a point of the line of contact `k` lies in a tetrahedron.
+pub(super) fn is_swallowed(model: &Model, k: usize, x: &[Vec3]) -> bool {
+    let mesh = model.mesh();
+    let contact = &model.parts().contacts[k];
+    let place = contact.motion(&mesh.nodes, x);
+    let points: Vec<Vec3> = contact.axis.iter().map(place).collect();
+    let Some((low, high)) = points.iter().map(|p| (*p, *p)).reduce(|(l, h), (p, _)| (l.inf(&p), h.sup(&p))) else {
+        return false;
+    };
+    mesh.tets.iter().any(|tet| {
+        let corners = tet.map(|a| x[a as usize]);
+        let from = corners[0].inf(&corners[1]).inf(&corners[2].inf(&corners[3]));
+        let to = corners[0].sup(&corners[1]).sup(&corners[2].sup(&corners[3]));
+        let near = (0..3).all(|c| from[c] <= high[c] && low[c] <= to[c]);
+        near && points.iter().any(|p| holds(&corners, p))
+    })
+}
+
+/// Whether a tetrahedron of positive volume holds a point.
+fn holds(corners: &[Vec3; 4], p: &Vec3) -> bool {
+    (0..4).all(|k| {
+        let mut sub = *corners;
+        sub[k] = *p;
+        signed_volume(sub) > 0.0
+    })
 }

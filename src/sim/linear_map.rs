@@ -19,6 +19,7 @@ use super::step::{read_pivots, target};
 use crate::fem::{At, Configuration, Role};
 use crate::math::lane::{BATCH, Lane, Real};
 use crate::math::{Mat3, Pose, Vec3};
+use crate::mesh::TetMesh;
 use crate::port::Slot;
 use crate::solve::{Minimiser, Problem};
 
@@ -71,6 +72,8 @@ pub(super) struct LinearMap {
     /// Norm of the residual (N) and last correction (m) of each column; the first is that of q = 0.
     residuals: Vec<f64>,
     corrections: Vec<f64>,
+    /// Largest norm of F - 1 of each column.
+    strains: Vec<f64>,
 }
 
 /// Causes of a scene whose equilibrium may be read off a table; none where it is not linear in the inputs, is no
@@ -131,6 +134,8 @@ pub(super) struct Column {
     pub(super) nodal: Vec<Vec3>,
     pub(super) residual: f64,
     pub(super) correction: f64,
+    /// Largest norm of F - 1.
+    pub(super) strain: f64,
 }
 
 impl<'a> Builder<'a> {
@@ -184,11 +189,16 @@ impl<'a> Builder<'a> {
 
     /// The answer to nothing, then to each cause; what is at rest is where the builder stays.
     pub(super) fn columns(&mut self, causes: &[Cause]) -> Vec<Column> {
+        let mesh = self.model.mesh();
+        let inverse = rest_inverses(mesh);
         let mut columns = vec![self.column(None, None)];
+        columns[0].strain = largest_strain(mesh, &inverse, &self.config.x, &mesh.nodes);
         let (rest, g) = (self.config.clone(), self.g.clone());
         for &cause in causes {
             self.set(cause, 1.0);
-            columns.push(self.column(Some(&g), Some(&columns[0].nodal)));
+            let mut column = self.column(Some(&g), Some(&columns[0].nodal));
+            column.strain = largest_strain(mesh, &inverse, &self.config.x, &rest.x);
+            columns.push(column);
             self.set(cause, 0.0);
             self.config.copy_from(&rest);
         }
@@ -209,6 +219,7 @@ impl<'a> Builder<'a> {
             reactions: (0..n_bones).map(|b| Reaction::new(model, &self.pivots, b, &nodal)).collect(),
             residuals: columns.iter().map(|c| c.residual).collect(),
             corrections: columns.iter().map(|c| c.correction).collect(),
+            strains: columns.iter().map(|c| c.strain).collect(),
             causes,
             made_for: self.made_for,
             is_cause: self.is_cause,
@@ -257,7 +268,7 @@ impl<'a> Builder<'a> {
             Some(base) => self.g.iter().zip(base).map(difference).sum::<f64>().sqrt(),
             None => self.g.iter().map(Vec3::norm_squared).sum::<f64>().sqrt(),
         };
-        Column { d, nodal, residual, correction }
+        Column { d, nodal, residual, correction, strain: 0.0 }
     }
 
     /// Moves the free nodes by `d`.
@@ -334,9 +345,9 @@ impl LinearMap {
         }
     }
 
-    /// Bounds of the residual (N) and of what a further correction would move (m) at the causes as set.
-    pub fn bounds(&self) -> [f64; 2] {
-        [&self.residuals, &self.corrections]
+    /// Bounds of the residual (N), of what a further correction would move (m) and of |F - 1| at the causes as set.
+    pub fn bounds(&self) -> [f64; 3] {
+        [&self.residuals, &self.corrections, &self.strains]
             .map(|of| of[0] + of[1..].iter().zip(&self.q).map(|(column, q)| column * q.abs()).sum::<f64>())
     }
 
@@ -406,6 +417,22 @@ impl Reaction {
         let m = pose.R * m;
         (f, Vec3::new(m[(1, 2)] - m[(2, 1)], m[(2, 0)] - m[(0, 2)], m[(0, 1)] - m[(1, 0)]))
     }
+}
+
+/// Inverses of the edges at rest of each tetrahedron's corners.
+fn rest_inverses(mesh: &TetMesh) -> Vec<Mat3> {
+    mesh.tets.iter().map(|tet| edges(tet, &mesh.nodes).try_inverse().unwrap_or_else(Mat3::zeros)).collect()
+}
+
+fn edges(tet: &[u32; 4], x: &[Vec3]) -> Mat3 {
+    let [a, b, c, d] = tet.map(|a| x[a as usize]);
+    Mat3::from_columns(&[b - a, c - a, d - a])
+}
+
+/// Largest norm of the displacement gradient of the tetrahedra's corners from `from` to `to`.
+fn largest_strain(mesh: &TetMesh, inverse: &[Mat3], to: &[Vec3], from: &[Vec3]) -> f64 {
+    let of = |(tet, inverse): (&[u32; 4], &Mat3)| ((edges(tet, to) - edges(tet, from)) * inverse).norm();
+    mesh.tets.iter().zip(inverse).map(of).fold(0.0, f64::max)
 }
 
 /// Free nodes that ports read (the skin's and those beside an osteotomy line), and those of bones: `(bone, which, node)`.

@@ -6,6 +6,7 @@ mod access;
 mod adjoint;
 mod ahead;
 mod approach;
+mod audit;
 mod derivative;
 mod linear_map;
 mod linearisation;
@@ -26,6 +27,7 @@ mod state;
 mod step;
 
 pub use access::View;
+pub use audit::{Place, worst_tets};
 pub use model::{
     Bone, Contact, Drive, Inertia, Marker, Model, ModelParts, Reduction, StandIn, Unconstrained, osteotomy_edges,
 };
@@ -53,7 +55,9 @@ const LONGEST_STEP: f64 = 1e100;
 pub enum SimError {
     /// The solver gave up, also with the host step cut into small pieces.
     #[error(
-        "step from t = {t:?} s by {dt:?} s: {source} (the load was cut down to 1/{cuts} of the step, {spent} linear solves spent)"
+        "step from t = {t:?} s by {dt:?} s: {source} ({:.0} % of the step was reached, it was cut down to 1/{cuts}, {spent} linear solves spent{})",
+        100.0 * reached,
+        place.as_ref().map_or(String::new(), |place| format!("; worst element: {place}"))
     )]
     Solve {
         /// Start of the step, s.
@@ -64,6 +68,10 @@ pub enum SimError {
         cuts: u32,
         /// Linear solves spent.
         spent: u32,
+        /// Share of the step that had an answer.
+        reached: f64,
+        /// The worst element where the solver gave up; `None` where that tells nothing.
+        place: Option<Box<Place>>,
         /// What the solver said.
         source: SolveError,
     },
@@ -175,6 +183,12 @@ pub enum SimError {
     /// A derivative that the scene or the state does not have.
     #[error("no derivative: {0}")]
     NoDerivative(String),
+    /// The start equilibrium of a dynamic scene whose tissue, or a part of it, nothing holds.
+    #[error(
+        "no start equilibrium: {0} piece(s) of tissue are held by no bone, the largest around ({1:.4}, {2:.4}, {3:.4}) m: set out \
+         at rest, with start = \"rest\" in [inertia], or attach a bone there"
+    )]
+    LooseStart(usize, f64, f64, f64),
     /// `[inertia] start = "rest"` with bones that do not start at rest.
     #[error(
         "the scene starts at rest, but bone `{0}` does not: give it a start pose of zero or start = \"equilibrium\""
@@ -387,6 +401,11 @@ impl Sim {
     /// [`SimError::TooManyModes`], and [`SimError::Setup`] if the modes are not found.
     pub fn spectrum(&mut self) -> Result<Option<Spectrum>, SimError> {
         step::spectrum(&self.model, &self.state, &mut self.work)
+    }
+
+    /// Where the solver gave up, m, by node of the mesh: of the last step that was refused for want of an answer.
+    pub fn refused(&self) -> Option<&[crate::math::Vec3]> {
+        self.work.refused()
     }
 
     /// Bytes of matrices, factor and solver, twice that with a factor made in the background; those of the model and of the

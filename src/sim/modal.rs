@@ -271,14 +271,14 @@ pub(super) fn advance(
     let mut scratch = std::mem::take(&mut modal.scratch);
     modal.coefficients(1.0, &modal.next.q, &modal.next.p, &mut scratch, &mut coefficients);
     (modal.map.q, modal.scratch) = (coefficients, scratch);
-    let [residual, correction] = modal.map.bounds();
+    let [residual, correction, _] = modal.map.bounds();
     let tolerance = model.parts().strategy.tolerance;
     if !(residual.is_finite() && correction <= tolerance) {
         let source = match residual.is_finite() && correction.is_finite() {
             true => SolveError::NotConverged { iterations: 0, correction, tolerance, residual },
             false => SolveError::NotFinite,
         };
-        return Err(SimError::Solve { t: state.t, dt, cuts: 1, spent: 0, source });
+        return Err(SimError::Solve { t: state.t, dt, cuts: 1, spent: 0, reached: 0.0, place: None, source });
     }
     let before = worst_jump(model, &state.config.x);
     modal.last.from.copy_from(from);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
+use super::audit::folds;
 use super::ports::{Layout, Source, table};
 use super::scheme::Scheme;
 use super::skin::Skin;
@@ -57,6 +58,8 @@ pub struct Marker {
     pub nodes: [u32; 3],
     /// Barycentric weights.
     pub weights: [f64; 3],
+    /// Distance of that point from the place that was asked for, m.
+    pub off: f64,
 }
 
 /// A rigid shape that a bone carries and the tissue cannot enter.
@@ -74,18 +77,26 @@ pub struct Contact {
     pub reach: f64,
     /// What it looks like at rest; no triangles where it has no end.
     pub surface: FineSkin,
+    /// Points of its line at rest, no further apart than its radius, m; none where it has no line.
+    pub axis: Vec<Vec3>,
 }
 
 impl Contact {
     /// The vertices of its surface where the nodes, at `X` when at rest, have gone to `x`, m.
     pub fn placed(&self, X: &[Vec3], x: &[Vec3]) -> Vec<Vec3> {
+        let place = self.motion(X, x);
+        self.surface.vertices.iter().map(place).collect()
+    }
+
+    /// Where a point of its rest position has gone.
+    pub(super) fn motion(&self, X: &[Vec3], x: &[Vec3]) -> impl Fn(&Vec3) -> Vec3 {
         let edges = |x: &[Vec3]| {
             let [a, b, c, d] = self.frame.map(|i| x[i as usize]);
             (a, Mat3::from_columns(&[b - a, c - a, d - a]))
         };
         let ((A, D), (a, d)) = (edges(X), edges(x));
         let F = d * D.try_inverse().unwrap_or_else(Mat3::zeros);
-        self.surface.vertices.iter().map(|p| a + F * (p - A)).collect()
+        move |p| a + F * (p - A)
     }
 }
 
@@ -198,6 +209,7 @@ pub struct Model {
     dofs: Dofs,
     skin: Skin,
     osteotomy: Vec<(u32, u32)>,
+    folds: bool,
     token: Arc<str>,
 }
 
@@ -227,8 +239,9 @@ impl Model {
                 osteotomy.len()
             ));
         }
+        let folds = folds(&parts.terms, &parts.mesh.nodes, &parts.start, parts.n_history);
         let token = token(&parts, &ports).into();
-        Ok(Model { parts, ports, sources, dofs, skin, osteotomy, token })
+        Ok(Model { parts, ports, sources, dofs, skin, osteotomy, folds, token })
     }
 
     /// The same without one rung of recovery, to measure what it buys.
@@ -240,6 +253,21 @@ impl Model {
     /// Whether its state depends on the way it came: by inertia, or by tissue with a memory.
     pub fn remembers(&self) -> bool {
         self.parts.inertia.is_some() || self.parts.n_history > 0
+    }
+
+    /// Tissue that nothing holds, which a scene with inertia may have.
+    pub(super) fn unconstrained(&self) -> Option<Unconstrained> {
+        check_held(&self.parts, &self.dofs).err()
+    }
+
+    /// Whether its elements may turn inside out at a finite energy.
+    pub(super) fn folds(&self) -> bool {
+        self.folds
+    }
+
+    /// Whether this node moves the shape of a contact, and is of no tissue.
+    pub(super) fn is_frame(&self, a: u32) -> bool {
+        self.parts.contacts.iter().any(|c| c.frame.contains(&a))
     }
 
     /// How contact `k` touches at `x`.

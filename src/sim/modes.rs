@@ -306,7 +306,7 @@ fn shapes(builder: &mut Builder, phi: &[Vec<Vec3>], lambda: &[f64], m: &[f64]) -
         let left = builder.g.iter().zip(&g).zip(phi).zip(m).map(|(((g, rest), phi), m)| g - rest - *lambda * *m * phi);
         let residual = left.map(|r| r.norm_squared()).sum::<f64>().sqrt();
         let correction = REMAINDER * phi.iter().map(Vec3::norm).fold(0.0, f64::max);
-        Column { d: phi.clone(), nodal: difference(&builder.nodal, &nodal), residual, correction }
+        Column { d: phi.clone(), nodal: difference(&builder.nodal, &nodal), residual, correction, strain: 0.0 }
     };
     phi.iter().zip(lambda).map(&mut of).collect()
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::ahead::Ahead;
 use super::approach::{Approach, check_depth};
+use super::audit::{Balance, hangs, is_same_place, snapped, warn_of_squeezing, worst_place};
 use super::linear_map::LinearMap;
 use super::linearisation::{Linearisation, with_problem};
 use super::modal;
@@ -23,7 +24,7 @@ use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
 use crate::math::{Mat3, Pose, Vec3, best_fit};
 use crate::port::Slot;
-use crate::solve::{Allowance, Minimiser, Outcome, Problem, Rung};
+use crate::solve::{Allowance, Minimiser, Outcome, Problem, Rung, Way};
 
 /// A step is cut into pieces no smaller than this part of it.
 const SMALLEST_PIECE: f64 = 1.0 / 64.0;
@@ -33,6 +34,11 @@ const SMALLEST_TO_AVOID_INVERSION: f64 = 1.0 / 8.0;
 const ROUND_OFF: f64 = 1e-9;
 /// Most linear solves of a whole step, in units of `solver.max_iterations`.
 const BUDGET: u32 = 4;
+/// Linear solves and factorisations, as many as are spent on pieces without an answer before the step is refused. No step of the
+/// torture scenes that has an answer wastes more than 164 solves' worth.
+const PATIENCE: (f64, f64) = (240.0, 20.0);
+/// Most of one piece, in the same.
+const MOST_WORK: (f64, f64) = (1000.0, 40.0);
 /// After a piece that succeeded the next one may be this much larger.
 const GROWTH: f64 = 2.0;
 /// Change of ln dt beyond which the stiffness with inertia is factored anew.
@@ -45,6 +51,11 @@ const LARGEST_JUMP: f64 = 0.3;
 const RIGID_REMAINDER: f64 = 0.5;
 /// Turns smaller than this (rad, squared) leave the factor as it is.
 const FRAME_THRESHOLD: f64 = 0.05 * 0.05;
+
+/// A bound of |F - 1| up to which no det F can be below 0.1, with some room for elements that are not linear.
+const SMALL_STRAIN: f64 = 0.4;
+/// Growth of that bound after which the elements of a table are looked at again.
+const LOOK_AGAIN: f64 = 1.2;
 
 /// What a step did.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,6 +109,19 @@ pub(super) struct Workspace {
     pivots: Vec<Vec3>,
     u: Vec<Vec3>,
     wrenches: Vec<(Vec3, Vec3)>,
+    /// The largest bound of |F - 1| at which elements of the table were looked at, and the smallest det F found.
+    looked_at: (f64, f64),
+    /// The last step without an answer: asked again, it is not tried again.
+    refused: Option<Box<Refused>>,
+}
+
+/// A step that had no answer.
+struct Refused {
+    from: State,
+    dt: f64,
+    error: SimError,
+    /// Where the solver gave up, m.
+    x: Vec<Vec3>,
 }
 
 /// A piece of time that was accepted.
@@ -156,7 +180,14 @@ impl Workspace {
             u: vec![Vec3::zeros(); model.dofs().prescribed.len()],
             pivots,
             wrenches,
+            looked_at: (0.0, 1.0),
+            refused: None,
         })
+    }
+
+    /// Where the last step without an answer was given up, m.
+    pub fn refused(&self) -> Option<&[Vec3]> {
+        self.refused.as_ref().map(|refused| &refused.x[..])
     }
 
     pub fn minimiser(&self) -> &Minimiser {
@@ -196,10 +227,20 @@ pub(super) fn initialise(model: &Arc<Model>, state: &mut State, work: &mut Works
         work.kept.origin = Origin::Rest;
         return Ok(StepReport::new(0));
     }
-    let report = advance(model, state, work, 0.0, None)?;
+    let report = advance(model, state, work, 0.0, None).map_err(|error| loose_start(model, error))?;
     // Nothing has moved yet: the way to the start equilibrium is no velocity.
     state.motion.halt();
     Ok(report)
+}
+
+/// Says what a dynamic scene can do about tissue that moves freely.
+fn loose_start(model: &Model, error: SimError) -> SimError {
+    match (&error, model.unconstrained()) {
+        (SimError::Solve { source: SolveError::Singular { .. }, .. }, Some(loose)) => {
+            SimError::LooseStart(loose.count, loose.x, loose.y, loose.z)
+        }
+        _ => error,
+    }
 }
 
 /// Gives the tissue the acceleration that its forces make at rest, where the scheme remembers one.
@@ -232,6 +273,9 @@ pub(super) fn advance(
     mut watch: Option<&mut dyn FnMut(&State)>,
 ) -> Result<StepReport, SimError> {
     check_inputs(model, &state.inputs)?;
+    if let Some(again) = work.refused.as_ref().filter(|refused| refused.dt == dt && refused.from == *state) {
+        return Err(again.error.clone());
+    }
     if let Some(report) = hold(model, state, dt) {
         return Ok(report);
     }
@@ -259,6 +303,15 @@ pub(super) fn advance(
     }
     let mut spent_before = 0;
     let mut surely = true;
+    let least_before = if model.folds() { min_det_f(model, &work.config.x) } else { f64::INFINITY };
+    let mut least = least_before;
+    let only_bones = moves_only_bones(model, state);
+    let allowance = |(solves, factors): (f64, f64)| match work.minimiser.work_of_a_factor() {
+        // Newton's method is bounded by its count of solves alone.
+        0.0 => f64::INFINITY,
+        factor => solves + factors * factor,
+    };
+    let (mut patience, most_work) = (allowance(PATIENCE), allowance(MOST_WORK));
     while done < 1.0 {
         let Workspace { pivots, config, inputs, before, .. } = &mut *work;
         let approach = Approach { model, from: &state.applied, to: &state.inputs, pivots, config, done, smallest };
@@ -275,7 +328,10 @@ pub(super) fn advance(
         let linearised_before = linearisation.clone();
         let t = state.t + to * dt;
         let bound = pace.filter(|_| to - done > smallest);
-        match step_piece(model, work, &mut linearisation, t, dt * (to - done), to - done, bound, &mut report) {
+        let work_before = work.minimiser.work();
+        work.minimiser.set_limit(work_before + most_work);
+        let cut = Cut { t, dt: dt * (to - done), part: to - done, smallest, least, only_bones };
+        match step_piece(model, work, &mut linearisation, &cut, bound, &mut report, &mut least) {
             Ok(()) => {
                 report.substeps += 1;
                 piece = GROWTH * (to - done);
@@ -298,26 +354,37 @@ pub(super) fn advance(
                 piece = even_part(1.0 - done, (factor * (to - done)).max(smallest));
             }
             Err(Setback::Failed(source)) => {
-                work.config.copy_from(&work.before);
                 linearisation = linearised_before;
                 piece = 0.5 * (to - done);
                 report.iterations += source.iterations();
+                patience -= work.minimiser.work() - work_before;
                 let spent = report.iterations - spent_before;
                 if source.is_final()
                     || piece < smallest
                     || !model.parts().strategy.has(Rung::Pieces)
+                    || patience <= 0.0
                     || spent > BUDGET * model.parts().strategy.max_iterations
                 {
                     let cuts = (1.0 / (to - done)).round() as u32;
-                    return Err(SimError::Solve { t: state.t, dt, cuts, spent: report.iterations, source });
+                    let is_final = source.is_final();
+                    let place = worst_place(model, &work.config.x).map(Box::new);
+                    let spent = report.iterations;
+                    let error = SimError::Solve { t: state.t, dt, cuts, spent, reached: done, place, source };
+                    // What the host has ended may have an answer.
+                    if is_final {
+                        work.config.copy_from(&work.before);
+                        return Err(error);
+                    }
+                    let x = work.config.x.clone();
+                    work.refused = Some(Box::new(Refused { from: state.clone(), dt, error: error.clone(), x }));
+                    return Err(error);
                 }
+                work.config.copy_from(&work.before);
             }
         }
     }
-    let smallest = min_det_f(model, &work.config.x);
-    if smallest <= 0.0 && min_det_f(model, &state.config.x) > 0.0 {
-        report.warnings.push(format!("elements are turned inside out (smallest det F {smallest:.3})"));
-    }
+    let least_before = if model.folds() { least_before } else { min_det_f(model, &state.config.x) };
+    warn_of_squeezing(model, least_before, min_det_f(model, &work.config.x), &work.config.x, &mut report.warnings);
     if !surely {
         report.warnings.push("a contact's shape goes so far in this step that it may have passed tissue".into());
     }
@@ -336,7 +403,56 @@ pub(super) fn advance(
     let at = At { t: piece.t, dt: piece.dt, inputs, history: remembered, x_tilde, ..At::NOWHERE };
     let end = || Linearisation::new(config, &at, piece.dt_before);
     state.upcoming = ahead.look(model, state.upcoming.take(), &report, minimiser, end);
+    if let Some(moved) = hangs(model, state).filter(|_| dt > 0.0) {
+        settle(model, state, work, &mut report, moved);
+    }
     Ok(report)
+}
+
+/// Takes tissue that hangs off rest, `moved` by so much (m) although every input is at rest, back where that is lower.
+fn settle(model: &Arc<Model>, state: &mut State, work: &mut Workspace, report: &mut StepReport, moved: f64) {
+    let mut fresh = State::start(model);
+    (fresh.t, fresh.inputs) = (state.t, state.inputs.clone());
+    let elastic = |state: &State| strain(model, state, &state.config.x).energy;
+    let is_lower = match advance(model, &mut fresh, work, 0.0, None) {
+        Ok(way) => {
+            report.iterations += way.iterations;
+            report.factorisations += way.factorisations;
+            if is_same_place(model, &fresh, state) {
+                // Rest is no equilibrium: a shape of a contact pushes there, say.
+                return;
+            }
+            elastic(&fresh) < elastic(state)
+        }
+        Err(_) => false,
+    };
+    let what = format!("every input is at rest, but the tissue came to hang up to {:.3} mm off", 1e3 * moved);
+    if !is_lower {
+        report.warnings.push(format!("{what}: it keeps {:.2e} J in an equilibrium of its own", elastic(state)));
+        return;
+    }
+    report.warnings.push(format!(
+        "{what}, in an equilibrium of {:.2e} J: it was taken back to rest, which is lower; the way there and back was not \
+         one that tissue could have gone (smaller steps, or a law that resists collapse, find it)",
+        elastic(state)
+    ));
+    fresh.outputs.dt = state.outputs.dt;
+    *state = fresh;
+}
+
+/// Whether nothing but bones that are driven by pose or node by node moves in the step that `state` is about to make.
+fn moves_only_bones(model: &Model, state: &State) -> bool {
+    let layout = &model.parts().layout;
+    let bones = model.parts().bones.len();
+    let mut moving: Vec<std::ops::Range<usize>> = Vec::new();
+    for slot in [Slot::BoneTranslation, Slot::BoneRotation] {
+        moving.extend(layout.first(slot).map(|first| first..first + 3 * bones));
+    }
+    for (b, bone) in model.parts().bones.iter().enumerate() {
+        moving.extend(layout.first(Slot::BoneNodal(b as u32)).map(|first| first..first + 3 * bone.nodes.len()));
+    }
+    let mut changed = (0..state.inputs.len()).filter(|&k| state.inputs[k] != state.applied[k]);
+    changed.all(|k| moving.iter().any(|range| range.contains(&k)))
 }
 
 /// Takes over where `work` has come to.
@@ -381,7 +497,15 @@ fn look_up(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> R
         complete(model, state, work);
         work.factored = None;
         let made = LinearMap::new(model, &mut work.minimiser, &state.inputs);
-        let refused = |source| SimError::Solve { t: state.t, dt, cuts: 1, spent: report.iterations, source };
+        let refused = |source| SimError::Solve {
+            t: state.t,
+            dt,
+            cuts: 1,
+            spent: report.iterations,
+            reached: 0.0,
+            place: None,
+            source,
+        };
         let Some((map, solves)) = made.map_err(refused)? else {
             work.table = Table::None;
             return Ok(None);
@@ -395,7 +519,7 @@ fn look_up(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> R
         return Ok(None);
     };
     map.set(model, &state.inputs, &work.config.poses);
-    let [residual, correction] = map.bounds();
+    let [residual, correction, strain_bound] = map.bounds();
     if !(residual.is_finite() && correction <= model.parts().strategy.tolerance) {
         // Inputs so large that the table's round-off shows.
         map.set(model, &state.applied, &state.config.poses);
@@ -404,6 +528,13 @@ fn look_up(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> R
     }
     let before = worst_jump(model, &state.config.x);
     read_pivots(model, &state.inputs, &mut work.pivots);
+    // To look at all elements costs many steps: once the bound has grown.
+    if strain_bound > SMALL_STRAIN.max(LOOK_AGAIN * work.looked_at.0) {
+        map.place_whole(model, &state.inputs, &work.pivots, &mut work.config);
+        let least = min_det_f(model, &work.config.x);
+        warn_of_squeezing(model, work.looked_at.1, least, &work.config.x, &mut report.warnings);
+        work.looked_at = (strain_bound, least.min(work.looked_at.1));
+    }
     state.config.poses.copy_from_slice(&work.config.poses);
     map.place_seen(model, &state.inputs, &work.pivots, &mut state.config);
     state.partial = true;
@@ -476,18 +607,34 @@ impl From<SolveError> for Setback {
     }
 }
 
-/// One piece of a step, from and into `work`; `bound` by an accuracy if it may still be cut.
-#[allow(clippy::too_many_arguments)] // the time, its length and its part of the step are three facts
+/// A piece of a step as it is tried.
+struct Cut {
+    /// Its end, s.
+    t: f64,
+    /// Its length, s.
+    dt: f64,
+    /// Its part of the step.
+    part: f64,
+    /// The smallest part that a step is cut into.
+    smallest: f64,
+    /// Smallest det F where it starts; +inf where no element can turn inside out.
+    least: f64,
+    /// Whether nothing but bones moves in it.
+    only_bones: bool,
+}
+
+/// One piece of a step, from and into `work`; `bound` by an accuracy if it may still be cut. The smallest det F where it ends
+/// goes into `least`.
 fn step_piece(
     model: &Model,
     work: &mut Workspace,
     linearisation: &mut Option<Arc<Linearisation>>,
-    t: f64,
-    dt: f64,
-    piece: f64,
+    cut: &Cut,
     bound: Option<Pace>,
     report: &mut StepReport,
+    least: &mut f64,
 ) -> Result<(), Setback> {
+    let Cut { t, dt, part: piece, .. } = *cut;
     let parts = model.parts();
     let strategy = &parts.strategy;
     let dofs = model.dofs();
@@ -511,15 +658,15 @@ fn step_piece(
     *last = None;
     let at = At { t, dt, inputs, history, ..At::NOWHERE };
     let is_inverted = |x: &[Vec3]| min_det_f(model, x) <= 0.0;
+    let mut inverted_before = cut.least <= 0.0;
     // A start that no step has led to may be tangled.
     let untangled =
         linearisation.is_none() && !model.is_quadratic() && strategy.has(Rung::StandIn) && is_inverted(&config.x);
-    let mut still_tangled = false;
     if untangled {
         let outcome = untangle(model, pivots, minimiser.allowance(), config)?;
         report.iterations += outcome.iterations;
         report.factorisations += outcome.factorisations;
-        still_tangled = is_inverted(&config.x);
+        inverted_before = is_inverted(&config.x);
     }
 
     place_bones(model, inputs, config);
@@ -538,30 +685,55 @@ fn step_piece(
         }
         minimiser.set_frame(frame(factored.as_deref(), config));
     }
-    minimiser.predict(&problem, config, u);
+    let potential = minimiser.predict(&problem, config, u);
+    let bones_work = |minimiser: &Minimiser| -> f64 {
+        let g = minimiser.nodal_gradient();
+        dofs.prescribed.iter().zip(&*u).map(|(&a, u)| g[a as usize].dot(u)).sum()
+    };
+    let work_before = bones_work(minimiser);
     report.iterations += 1;
-    let outcome = match minimiser.minimise(&problem, config) {
+    let may_cut = piece > if parts.may_invert { SMALLEST_TO_AVOID_INVERSION } else { cut.smallest };
+    let avoid_inversion = !problem.is_quadratic() && model.folds() && strategy.has(Rung::Inversion) && !inverted_before;
+    let way = match (avoid_inversion, may_cut) {
+        (false, _) => Way::Any,
+        (true, false) => Way::Watched,
+        (true, true) => Way::Upright,
+    };
+    let outcome = match minimiser.minimise_by(way, &problem, config) {
         // A small piece of load alone, predicted beyond what the law allows: go there from where the tissue is.
         Err(SolveError::NotFinite)
             if piece <= SMALLEST_TO_AVOID_INVERSION && !untangled && u.iter().all(|u| *u == Vec3::zeros()) =>
         {
             config.copy_from(before);
-            minimiser.minimise(&problem, config)
+            minimiser.minimise_by(way, &problem, config)
         }
         outcome => outcome,
     };
     // A piece that is not taken may leave another factor behind than the state remembers.
     let outcome = outcome.inspect_err(|_| *factored = None)?;
     report.count(&outcome);
-    let inverted_before = || if untangled { still_tangled } else { is_inverted(&before.x) };
-    let avoid_inversion = !problem.is_quadratic()
-        && strategy.has(Rung::Inversion)
-        && (!parts.may_invert || piece > SMALLEST_TO_AVOID_INVERSION);
-    if avoid_inversion && is_inverted(&config.x) && !inverted_before() {
+    *least = if model.folds() { min_det_f(model, &config.x) } else { f64::INFINITY };
+    if avoid_inversion && *least <= 0.0 && (may_cut || !parts.may_invert) {
         *factored = None;
-        return Err(SolveError::Inverts.into());
+        return Err(SolveError::Inverts { iterations: 0 }.into());
     }
-    check_depth(model, &config.x).inspect_err(|_| *factored = None)?;
+    if outcome.crossed && *least > 0.0 {
+        tell(
+            report,
+            "the way to this state leads through elements turned inside out, even in the smallest piece: it may not \
+                      be the one that the tissue would have taken; smaller steps or a law that resists collapse (the \
+                      default) decide it",
+        );
+    }
+    if cut.only_bones && !problem.is_quadratic() && !model.remembers() && !untangled && dt > 0.0 {
+        let work = [work_before, bones_work(minimiser)];
+        let balance = Balance { before: potential, work, after: outcome.energy };
+        let elastic = |x: &[Vec3]| parts.terms.iter().map(|t| t.strain(&at, x).energy).sum();
+        if let Some(message) = snapped(&balance, &before.x, &config.x, elastic) {
+            tell(report, &message);
+        }
+    }
+    check_depth(model, &before.x, &config.x).inspect_err(|_| *factored = None)?;
     if parts.inertia.as_ref().is_some_and(|i| i.accuracy.is_some()) {
         let error = formula.as_ref().map_or(0.0, |(_, formula)| motion.error(formula, dofs, before, config));
         if let Some(pace) = bound.filter(|pace| !pace.holds(error)) {
@@ -585,6 +757,13 @@ fn step_piece(
         motion.arrive(formula, dt, dofs, before, config);
     }
     Ok(())
+}
+
+/// Adds a warning that is not there yet.
+fn tell(report: &mut StepReport, message: &str) {
+    if !report.warnings.iter().any(|warning| warning == message) {
+        report.warnings.push(message.into());
+    }
 }
 
 /// `at` with the coefficients of the scene's scheme, after a piece of `dt_before`.

@@ -54,6 +54,21 @@ pub struct Outcome {
     pub correction: f64,
     /// Norm of the gradient of the unknowns, N (torques by their number).
     pub residual: f64,
+    /// Energy at the end, J.
+    pub energy: f64,
+    /// Whether an iterate was seen to have an element turned inside out.
+    pub crossed: bool,
+}
+
+/// By which way a minimum may be sought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// By any; nobody looks.
+    Any,
+    /// By any; the outcome says whether elements were inside out on it.
+    Watched,
+    /// By none on which elements are inside out.
+    Upright,
 }
 
 /// Fraction of the promised descent that a step must keep.
@@ -62,6 +77,8 @@ const ARMIJO: f64 = 1e-4;
 const ENERGY_NOISE: f64 = 1e-12;
 /// Shortenings before a direction is given up; the last one tries 2^-30 of it.
 const MAX_SHORTENINGS: u32 = 30;
+/// What the forces take of a linear solve.
+const WORK_OF_FORCES: f64 = 0.3;
 /// Iterations that a shortened step counts for when the factor's age is judged.
 const SHORTENED_AGES: u32 = 4;
 
@@ -81,6 +98,9 @@ pub struct Minimiser {
     factored_at: Configuration,
     trial: Configuration,
     lag: Configuration,
+    /// Work so far, and where it has to end, in linear solves.
+    work: f64,
+    limit: f64,
     /// Gradient at the nodes, reactions included, N.
     nodal: Vec<Vec3>,
     g: Vec<Vec3>,
@@ -115,6 +135,8 @@ impl Minimiser {
             factored_at: config.clone(),
             trial: config.clone(),
             lag: config,
+            work: 0.0,
+            limit: f64::INFINITY,
             nodal: vec![Vec3::zeros(); problem.X.len()],
             g: vec![Vec3::zeros(); n],
             g_trial: vec![Vec3::zeros(); n],
@@ -151,6 +173,22 @@ impl Minimiser {
     pub fn memory(&self) -> usize {
         let vectors = 2 * self.nodal.len() * 2 + self.g.len() * (3 + 2 * self.strategy.memory);
         self.assembly.memory() + self.solver.memory() + vectors * size_of::<Vec3>()
+    }
+
+    /// Work so far in linear solves: each of them, forces and factorisations by what they take of one.
+    pub fn work(&self) -> f64 {
+        self.work
+    }
+
+    /// Lets minimisations go on until [`Minimiser::work`] is this much.
+    pub fn set_limit(&mut self, limit: f64) {
+        self.limit = limit;
+    }
+
+    /// What a factorisation takes, in linear solves, as measured from 1k to 200k tetrahedra. Newton's method pays with each
+    /// solve for one, and solves by iteration are not told apart: both count by solves alone.
+    pub fn work_of_a_factor(&self) -> f64 {
+        if self.strategy.memory == 0 { 0.0 } else { 0.15 * self.factor_len() as f64 / self.n_unknowns().max(1) as f64 }
     }
 
     /// Whether a factor is at hand.
@@ -190,6 +228,7 @@ impl Minimiser {
         self.frame = Mat3::identity();
         self.memory.forget();
         for curvature in [Curvature::Exact, Curvature::Projected] {
+            self.work += self.work_of_a_factor();
             problem.assemble(&mut self.assembly, config, &self.nodal, curvature);
             match self.solver.factor(&self.assembly.K) {
                 Ok(()) => {
@@ -218,11 +257,11 @@ impl Minimiser {
     }
 
     /// Moves `config` to where the factor at hand expects the equilibrium once the prescribed nodes have gone by `u`:
-    /// `K d = -(g + K_p u)`. The prescribed nodes of `config` are moved, too.
-    pub fn predict(&mut self, problem: &Problem, config: &mut Configuration, u: &[Vec3]) {
+    /// `K d = -(g + K_p u)`. The prescribed nodes of `config` are moved, too. Returns the energy before, J.
+    pub fn predict(&mut self, problem: &Problem, config: &mut Configuration, u: &[Vec3]) -> f64 {
         let Minimiser { assembly, solver, strategy, frame, lag, nodal, g, d, trial, .. } = self;
         lag.copy_from(config);
-        problem.gradient(config, lag, nodal, g);
+        let energy = problem.gradient(config, lag, nodal, g);
         d.fill(Vec3::zeros());
         assembly.K_p.add_product(|p| frame.tr_mul(&u[p]), d);
         for (d, g) in d.iter_mut().zip(&*g) {
@@ -239,6 +278,7 @@ impl Minimiser {
         }
         problem.dofs.retract(problem.X, problem.pivots, config, 1.0, d, trial);
         config.copy_from(trial);
+        energy
     }
 
     /// Minimises from `config` on, which ends at the best point found.
@@ -246,10 +286,29 @@ impl Minimiser {
     /// # Errors
     /// [`SolveError`]; `config` is then not an equilibrium.
     pub fn minimise(&mut self, problem: &Problem, config: &mut Configuration) -> Result<Outcome, SolveError> {
+        self.minimise_by(Way::Any, problem, config)
+    }
+
+    /// The same with an eye on elements turned inside out on the way: another equilibrium may lie behind them.
+    ///
+    /// # Errors
+    /// As for [`Minimiser::minimise`], and [`SolveError::Inverts`] as soon as an iterate has such an element that `way` bars.
+    pub fn minimise_by(
+        &mut self,
+        way: Way,
+        problem: &Problem,
+        config: &mut Configuration,
+    ) -> Result<Outcome, SolveError> {
         let lagged = problem.is_lagged();
         let newton = self.strategy.memory == 0;
-        let mut outcome =
-            Outcome { iterations: 0, factorisations: 0, correction: f64::INFINITY, residual: f64::INFINITY };
+        let mut outcome = Outcome {
+            iterations: 0,
+            factorisations: 0,
+            correction: f64::INFINITY,
+            residual: f64::INFINITY,
+            energy: f64::NAN,
+            crossed: false,
+        };
         let mut age = 0;
         self.memory.forget();
         self.lag.copy_from(config);
@@ -257,6 +316,11 @@ impl Minimiser {
         let mut energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
         if !energy.is_finite() {
             return Err(SolveError::NotFinite);
+        }
+        let crosses = |config: &Configuration| way != Way::Any && problem.min_det_f(&config.x) <= 0.0;
+        outcome.crossed = crosses(config);
+        if outcome.crossed && way == Way::Upright {
+            return Err(SolveError::Inverts { iterations: 0 });
         }
         loop {
             let stale = newton && outcome.iterations > 0 && !problem.is_quadratic();
@@ -287,6 +351,10 @@ impl Minimiser {
                     std::mem::swap(&mut self.g, &mut self.g_trial);
                     config.copy_from(&self.trial);
                     energy = new_energy;
+                    outcome.crossed |= crosses(config);
+                    if outcome.crossed && way == Way::Upright {
+                        return Err(SolveError::Inverts { iterations: outcome.iterations });
+                    }
                     age += if alpha < 1.0 { SHORTENED_AGES } else { 1 };
                 }
                 // A step below the tolerance that round-off cannot tell from none is no failure.
@@ -296,7 +364,7 @@ impl Minimiser {
                 None if self.memory.is_empty() && (age == 0 || problem.is_quadratic()) => {
                     return Err(self.not_converged(outcome));
                 }
-                None if outcome.iterations >= self.strategy.max_iterations => {
+                None if outcome.iterations >= self.strategy.max_iterations || self.work >= self.limit => {
                     return Err(self.not_converged(outcome));
                 }
                 None => {
@@ -313,10 +381,11 @@ impl Minimiser {
                 energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
             }
             outcome.residual = dot(&self.g, &self.g).sqrt();
+            outcome.energy = energy;
             if last {
                 return Ok(outcome);
             }
-            if outcome.iterations >= self.strategy.max_iterations {
+            if outcome.iterations >= self.strategy.max_iterations || self.work >= self.limit {
                 return Err(self.not_converged(outcome));
             }
         }
@@ -333,7 +402,8 @@ impl Minimiser {
 
     /// `d = -H g`; returns the slope `g.d`.
     fn direction(&mut self) -> f64 {
-        let Minimiser { solver, memory, frame, g, d, .. } = self;
+        let Minimiser { solver, memory, frame, g, d, work, .. } = self;
+        *work += 1.0;
         d.copy_from_slice(g);
         memory.apply(d, |q| {
             turn(&frame.transpose(), q);
@@ -354,6 +424,7 @@ impl Minimiser {
         }
         let mut alpha = 1.0;
         for _ in 0..=MAX_SHORTENINGS {
+            self.work += WORK_OF_FORCES;
             problem.dofs.retract(problem.X, problem.pivots, config, alpha, &self.d, &mut self.trial);
             let tried = problem.gradient(&self.trial, &self.lag, &mut self.nodal, &mut self.g_trial);
             let noise = ENERGY_NOISE * (energy.abs() + tried.abs());

@@ -22,7 +22,7 @@ pub use allowance::Allowance;
 pub use cholesky::{Cholesky, MOST_ENTRIES};
 pub use eigen::{Modes, slowest_modes};
 pub use gradients::Gradients;
-pub use minimise::{Minimiser, Outcome, Strategy};
+pub use minimise::{Minimiser, Outcome, Strategy, Way};
 pub use ordering::{elimination, nested_dissection};
 pub use problem::Problem;
 pub use rung::Rung;
@@ -84,12 +84,16 @@ pub enum SolveError {
         /// Bytes wanted.
         bytes: usize,
     },
-    /// The step would turn elements inside out; a smaller one may not.
+    /// The step would turn elements inside out, at its end or on the way there; a smaller one may not.
     #[error(
         "elements would be turned inside out: on this path the tissue has no equilibrium without; move or load it less, \
-         choose a law that resists collapse (neo-hookean), or take it as it is with [solver] inversion = \"allow\""
+         choose a law that resists collapse (polyconvex-neo-hookean, the default), or take it as it is with [solver] \
+         inversion = \"allow\""
     )]
-    Inverts,
+    Inverts {
+        /// Linear solves spent.
+        iterations: u32,
+    },
     /// The tissue lies so deep in the shape of a contact that it may come out on the wrong side; a smaller step may not.
     #[error(
         "the tissue would lie {depth:.2e} m deep in the shape of contact `{contact}`, which can tell its sides to {most:.2e} m: \
@@ -102,6 +106,16 @@ pub enum SolveError {
         depth: f64,
         /// Most, m.
         most: f64,
+    },
+    /// The middle of a contact's shape would come to lie inside the tissue; after a smaller step it may not.
+    #[error(
+        "the middle of contact `{contact}` would lie inside the tissue: the shape goes through the surface that it should push \
+         away, and its force and depth would mean nothing; move it from outside and less far, take a stiffer contact, or \
+         refine the mesh there"
+    )]
+    Swallowed {
+        /// Name of the contact.
+        contact: String,
     },
     /// The step has spent what it may.
     #[error(
@@ -134,11 +148,11 @@ impl SolveError {
     /// Linear solves spent in vain.
     pub fn iterations(&self) -> u32 {
         match self {
-            SolveError::NotConverged { iterations, .. } => *iterations,
+            SolveError::NotConverged { iterations, .. } | SolveError::Inverts { iterations } => *iterations,
             SolveError::Singular { .. }
             | SolveError::NotFinite
-            | SolveError::Inverts
             | SolveError::TooDeep { .. }
+            | SolveError::Swallowed { .. }
             | SolveError::TooLarge { .. }
             | SolveError::Memory { .. }
             | SolveError::Spent { .. }

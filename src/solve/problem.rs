@@ -45,6 +45,11 @@ impl Problem<'_> {
         config.x.iter().zip(self.X).any(|(x, X)| (x - X).norm() > far)
     }
 
+    /// Smallest det F of all elements at `x`.
+    pub fn min_det_f(&self, x: &[Vec3]) -> f64 {
+        self.terms.iter().map(|t| t.min_det_f(x)).fold(f64::INFINITY, f64::min)
+    }
+
     /// Energy, J.
     pub fn energy(&self, config: &Configuration, lag: &Configuration) -> f64 {
         let at = self.at(lag);

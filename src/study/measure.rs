@@ -136,9 +136,9 @@ pub fn measure(text: &str, folder: Option<&Path>, variant: &Variant, probe: &Pro
     for k in 1..=n {
         let start = ThreadTime::now();
         for j in 1..=s {
-            let t = (k - 1) as f64 + j as f64 / s as f64;
-            set(&mut sim, &programme.settings(t * programme.dt))?;
-            solves += sim.step(programme.dt / s as f64).map_err(|e| e.to_string())?.iterations;
+            let dt = programme.step(k) / s as f64;
+            set(&mut sim, &programme.settings(programme.time(k) - (s - j) as f64 * dt))?;
+            solves += sim.step(dt).map_err(|e| e.to_string())?.iterations;
         }
         read(&sim, at(Slot::SkinPosition), &mut skin)?;
         times.push(start.elapsed().as_secs_f64());

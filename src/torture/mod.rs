@@ -10,6 +10,7 @@ mod scene;
 mod starts;
 mod time;
 mod trial;
+mod ways;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
@@ -19,9 +20,10 @@ use trial::End;
 pub use trial::Tally;
 
 /// One law of each kind: quadratic, rotated, finite through inversion, infinite at J = 0, exponential.
-const LAWS: &[&str] = &["linear", "corotational", "stable-neo-hookean", "neo-hookean", "fung"];
+const LAWS: &[&str] =
+    &["linear", "corotational", "stable-neo-hookean", "polyconvex-neo-hookean", "neo-hookean", "fung"];
 /// For cases that ask nothing of the law.
-const ONE_LAW: &[&str] = &["stable-neo-hookean"];
+const ONE_LAW: &[&str] = &["polyconvex-neo-hookean"];
 /// Laws that stay finite through inversion soften towards it: past some load their equilibrium is inside out.
 const FOLDING: &[&str] = &["corotational", "stable-neo-hookean"];
 /// The linear law knows no rotation: elements may turn inside out under it, and the answer is still its own.
@@ -83,7 +85,7 @@ impl Row {
 
 /// Every case, theme by theme.
 pub fn catalogue() -> impl Iterator<Item = &'static Case> {
-    [starts::CASES, motion::CASES, materials::CASES, time::CASES, inputs::CASES].into_iter().flatten()
+    [starts::CASES, motion::CASES, ways::CASES, materials::CASES, time::CASES, inputs::CASES].into_iter().flatten()
 }
 
 impl Case {

@@ -214,7 +214,7 @@ fn results_carry_their_fields() {
     write_pvd(&scratch("result.pvd"), &[(0.0, 0, "result.vtu".into()), (0.0, 1, "tool.vtp".into())]).unwrap();
     let index = std::fs::read_to_string(scratch("result.pvd")).unwrap();
     assert!(index.contains("timestep=\"0\" group=\"\" part=\"1\" file=\"tool.vtp\""), "{index}");
-    write_vtp(&scratch("tool.vtp"), &mesh.nodes[..4], &[[0, 1, 2], [0, 2, 3]]).unwrap();
+    write_vtp(&scratch("tool.vtp"), &mesh.nodes[..4], &[[0, 1, 2], [0, 2, 3]], &[]).unwrap();
     let tool = std::fs::read_to_string(scratch("tool.vtp")).unwrap();
     let numbers: Vec<f64> = tool.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     let points: Vec<f64> = mesh.nodes[..4].iter().flat_map(|x| [x.x, x.y, x.z]).collect();

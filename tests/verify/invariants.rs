@@ -2,8 +2,8 @@
 
 use cutis::effect::LAWS;
 use cutis::energy::{
-    Corotational, Energy, Fung, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, StVenantKirchhoff, StableNeoHookean,
-    Stretches, VerondaWestmann, WithBulk, Yeoh,
+    Corotational, Energy, Fung, Lame, Linear, MooneyRivlin, NeoHookean, Ogden, PolyconvexNeoHookean, StVenantKirchhoff,
+    StableNeoHookean, Stretches, VerondaWestmann, WithBulk, Yeoh,
 };
 use cutis::math::{Mat3, clamp_eigenvalues, exp_rotation, outer};
 
@@ -49,6 +49,7 @@ fn energies_obey_the_laws_of_elasticity() {
     check(&Corotational(LAME), true);
     check(&StVenantKirchhoff(LAME), true);
     check(&StableNeoHookean(LAME), true);
+    check(&PolyconvexNeoHookean(LAME), true);
     check(&NeoHookean(LAME), true);
     let kappa = LAME.lambda + 2.0 / 3.0 * LAME.mu;
     check(&WithBulk { law: MooneyRivlin { c10: 0.4 * LAME.mu, c01: 0.1 * LAME.mu }, kappa }, true);

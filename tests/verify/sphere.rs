@@ -199,3 +199,28 @@ fn edges_that_would_fold_an_element_stay_straight() {
     assert_eq!((curving.curved, curving.straightened), (0, 30));
     assert_eq!(mesh.nodes, flat, "to the bit");
 }
+
+/// A face that lies in two sets is curved as in the larger one, whichever comes first; a rim of different surfaces stays.
+#[test]
+fn a_second_set_of_the_same_faces_changes_no_curve() {
+    let places = |change: &dyn Fn(&mut TetMesh)| {
+        let mut mesh = shell(1, 2);
+        change(&mut mesh);
+        let midsides = add_midsides(&mut mesh);
+        let curving = curve_midsides(&mut mesh, &midsides);
+        (mesh.nodes, curving.curved)
+    };
+    let (alone, curved) = places(&|_| {});
+    assert!(curved > 0);
+    for part in [1, 2, 3] {
+        for first in [true, false] {
+            let twice = places(&|mesh| {
+                let all = &mesh.face_sets[0].triangles;
+                let set = FaceSet { name: "again".into(), triangles: all[..all.len() / part].to_vec() };
+                mesh.face_sets.insert(if first { 0 } else { mesh.face_sets.len() }, set);
+            });
+            assert_eq!(twice.1, curved, "1/{part} of the faces again");
+            assert_eq!(twice.0, alone);
+        }
+    }
+}
