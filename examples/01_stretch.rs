@@ -17,7 +17,7 @@ size = [0.05, 0.02, 0.02]
 cells = [10, 4, 4]
 
 [[tissue]]
-energy = "stable-neo-hookean"
+energy = "polyconvex-neo-hookean"
 E = 15e3
 nu = 0.45
 

@@ -134,8 +134,7 @@ fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, E
     let (mut mesh, notes) = mesh_of(text, &file, path, folder)?;
     let (model, _) = build(text, &file, mesh.clone()).map_err(|e| scene_error(path, e))?;
     mesh.elimination = model.elimination();
-    let scene = scene::packed(text, BAKED_NAME).map_err(|e| scene_error(path, e))?;
-    Ok(Baked { scene, mesh: io::encode(&mesh), notes })
+    Ok(Baked { scene: scene::packed(text, BAKED_NAME), mesh: io::encode(&mesh), notes })
 }
 
 fn read(path: &Path) -> Result<String, Error> {

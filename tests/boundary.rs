@@ -9,6 +9,7 @@ mod boundary {
     mod archive;
     mod c_programs;
     mod description;
+    mod docs;
     mod header;
     mod importer;
     mod instructions;

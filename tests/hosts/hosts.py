@@ -7,7 +7,6 @@ FMI 3.0 is what the others are held against. Prints the table of docs/hosts.md.
 """
 
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -139,34 +138,6 @@ def cosim():
     return list(observer.last_real_values(slave, [variables[name] for name in REACTIONS]))
 
 
-COFMPY = """
-import json, sys
-from cofmpy import Coordinator
-path, dt, steps, jaw, reactions, heights = json.loads(sys.argv[1])
-source = {"type": "literal", "values": {repr(k * dt): z for k, z in enumerate(heights)}}
-connections = [{"source": source, "target": {"id": "head", "variable": jaw}}]
-fmus = [{"id": "head", "path": path, "name": "head"}]
-conf = {"fmus": fmus, "connections": connections, "cosim_method": "jacobi", "iterative": False, "root": "/"}
-with open(sys.argv[2], "w") as file:
-    json.dump(conf, file)
-coordinator = Coordinator()
-coordinator.start(sys.argv[2])
-for _ in range(steps):
-    coordinator.do_step(dt)
-print(json.dumps([coordinator.get_variable(("head", name))[-1] for name in reactions]))
-"""
-
-
-def cofmpy():
-    """In an environment of its own, whose place the environment variable tells."""
-    arguments = json.dumps([str(FMI2), DT, STEPS, JAW, REACTIONS, heights()])
-    with tempfile.TemporaryDirectory() as folder:
-        command = [f"{os.environ['COFMPY_VENV']}/bin/python", "-W", "ignore", "-c", COFMPY, arguments, f"{folder}/conf.json"]
-        told = subprocess.run(command, capture_output=True, text=True)
-    assert told.returncode == 0, told.stdout + told.stderr
-    return json.loads(told.stdout.strip().splitlines()[-1])
-
-
 def fmi_rs():
     program = Path(__file__).parent / "fmi_rs" / "target" / "release" / "cutis-host-fmi-rs"
     told = subprocess.run([program, FMI3], capture_output=True, text=True)
@@ -183,7 +154,6 @@ HOSTS = {
     "FMU Manipulation Toolbox 2.0, container of FMI 2.0, run by FMPy": container,
     "Ecos (ecospy 0.7.2), FMI 2.0": ecos,
     "libcosim (libcosimpy 0.0.6), FMI 2.0": cosim,
-    "CoFMPy 0.2.0 (on FMPy 0.3.20), FMI 2.0": cofmpy,
 }
 
 

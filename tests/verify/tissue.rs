@@ -35,7 +35,7 @@ fn fibres_limits_and_tension_have_the_derivatives_they_claim() {
         let term = (law.material)(&constants(law, 1.0));
         check_term(&*elements.of(term), &X, SEED);
     }
-    for volume in [Volume::Linear, Volume::Quadratic, Volume::Logarithmic] {
+    for volume in [Volume::Linear, Volume::Quadratic, Volume::Logarithmic, Volume::Polyconvex] {
         check_term(&NodalPressure::new(volume, elements, |e| 1.0 + e as f64), &X, SEED);
     }
 }
@@ -313,7 +313,7 @@ fn presets_are_tissues_with_sources() {
         sim.initialise().expect("pressed");
         furthest(&sim)
     };
-    let by_hand = moved("E = 0.5e3\nnu = 0.48\n");
+    let by_hand = moved("E = 0.5e3\nnu = 0.48\npressure = \"nodal\"\n");
     assert!((moved("preset = \"fat\"\nlevel = \"low\"\n") / by_hand - 1.0).abs() < 1e-6, "low fat is 0.5 kPa");
     let over = moved("preset = \"fat\"\nE = 0.5e3\n");
     assert!((over / by_hand - 1.0).abs() < 1e-6, "a key beside the preset wins");
