@@ -16,12 +16,30 @@ pub const DEFAULT_SCENE: &str = include_str!("../fmu/scene.toml");
 /// Name of the mesh file beside a packed scene.
 pub const BAKED_NAME: &str = "model.cutis";
 
-/// A model and the programme its scene gives it.
+/// A scene, loaded: a model and the programme that it gives it.
 pub struct Loaded {
     /// The model.
     pub model: Model,
     /// The programme of `cutis run`.
     pub programme: Programme,
+}
+
+impl Loaded {
+    /// A scene file; files it names are relative to its folder.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn open(scene: &Path) -> Result<Loaded, Error> {
+        from_file(scene)
+    }
+
+    /// A scene from its text; files it names are relative to the working directory.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn parse(text: &str) -> Result<Loaded, Error> {
+        from_text(text, None)
+    }
 }
 
 /// A scene made self-contained: its text reads the mesh from [`BAKED_NAME`], whose bytes are here.
@@ -134,7 +152,8 @@ fn baked_text(text: &str, path: &Path, folder: Option<&Path>) -> Result<Baked, E
     let (mut mesh, notes) = mesh_of(text, &file, path, folder)?;
     let (model, _) = build(text, &file, mesh.clone()).map_err(|e| scene_error(path, e))?;
     mesh.elimination = model.elimination();
-    Ok(Baked { scene: scene::packed(text, BAKED_NAME), mesh: io::encode(&mesh), notes })
+    let scene = scene::packed(text, BAKED_NAME).map_err(|e| scene_error(path, e))?;
+    Ok(Baked { scene, mesh: io::encode(&mesh), notes })
 }
 
 fn read(path: &Path) -> Result<String, Error> {

@@ -1,6 +1,6 @@
 //! FMI 3.0.2, co-simulation: every function of `fmi3Functions.h`, in its order.
 //!
-//! What the model description claims is done by [`super::instance`]; what it does not claim answers Error and says so
+//! What the model description claims is done by `instance`; what it does not claim answers Error and says so
 //! in the log. Names, arguments and types are the standard's; `fmi3Boolean` is taken as a byte, so that a host's odd
 //! truth value cannot become an invalid `bool`.
 #![allow(non_snake_case, non_camel_case_types)]
