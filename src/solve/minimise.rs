@@ -61,14 +61,46 @@ pub struct Outcome {
 }
 
 /// By which way a minimum may be sought.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Way {
     /// By any; nobody looks.
     Any,
     /// By any; the outcome says whether elements were inside out on it.
-    Watched,
+    Watched(Clearance),
     /// By none on which elements are inside out.
-    Upright,
+    Upright(Clearance),
+}
+
+/// How far nodes may go, m for each unit of the smallest det F, before elements are looked at again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clearance(pub f64);
+
+/// Looks for elements turned inside out on the way, where they can have come about since the last look.
+struct Watch {
+    clearance: Option<Clearance>,
+    /// Smallest det F found last, and how far nodes have gone since, m.
+    least: f64,
+    moved: f64,
+}
+
+impl Watch {
+    fn new(way: Way) -> Watch {
+        let clearance = match way {
+            Way::Any => None,
+            Way::Watched(clearance) | Way::Upright(clearance) => Some(clearance),
+        };
+        Watch { clearance, least: 0.0, moved: 0.0 }
+    }
+
+    /// Whether `config`, to which nodes have gone by no more than `motion` (m), has elements inside out.
+    fn crosses(&mut self, problem: &Problem, config: &Configuration, motion: f64) -> bool {
+        let Some(Clearance(clearance)) = self.clearance else { return false };
+        self.moved += motion;
+        if self.moved >= clearance * self.least {
+            (self.least, self.moved) = (problem.min_det_f(&config.x), 0.0);
+        }
+        self.least <= 0.0
+    }
 }
 
 /// Fraction of the promised descent that a step must keep.
@@ -317,9 +349,10 @@ impl Minimiser {
         if !energy.is_finite() {
             return Err(SolveError::NotFinite);
         }
-        let crosses = |config: &Configuration| way != Way::Any && problem.min_det_f(&config.x) <= 0.0;
-        outcome.crossed = crosses(config);
-        if outcome.crossed && way == Way::Upright {
+        let mut watch = Watch::new(way);
+        let upright = matches!(way, Way::Upright(_));
+        outcome.crossed = watch.crosses(problem, config, 0.0);
+        if outcome.crossed && upright {
             return Err(SolveError::Inverts { iterations: 0 });
         }
         loop {
@@ -342,7 +375,14 @@ impl Minimiser {
                 return Err(SolveError::NotFinite);
             }
             outcome.correction = problem.dofs.largest_motion(&self.d, config, problem.pivots);
-            let last = outcome.correction <= self.strategy.tolerance;
+            let mut last = outcome.correction <= self.strategy.tolerance;
+            if last && self.solver.factor_len() == 0 {
+                // A solve by iteration that stops early makes corrections look small: the one that ends it is solved to the end.
+                slope = self.precise_direction();
+                outcome.iterations += 1;
+                outcome.correction = problem.dofs.largest_motion(&self.d, config, problem.pivots);
+                last = outcome.correction <= self.strategy.tolerance;
+            }
             match self.search(problem, config, energy, slope) {
                 Some((alpha, new_energy)) => {
                     if self.strategy.has(Rung::Memory) {
@@ -351,8 +391,8 @@ impl Minimiser {
                     std::mem::swap(&mut self.g, &mut self.g_trial);
                     config.copy_from(&self.trial);
                     energy = new_energy;
-                    outcome.crossed |= crosses(config);
-                    if outcome.crossed && way == Way::Upright {
+                    outcome.crossed |= watch.crosses(problem, config, alpha * outcome.correction);
+                    if outcome.crossed && upright {
                         return Err(SolveError::Inverts { iterations: outcome.iterations });
                     }
                     age += if alpha < 1.0 { SHORTENED_AGES } else { 1 };
@@ -398,6 +438,15 @@ impl Minimiser {
             tolerance: self.strategy.tolerance,
             residual: dot(&self.g, &self.g).sqrt(),
         }
+    }
+
+    /// `d = -K^-1 g` to the last digits, without what L-BFGS remembers; returns the slope `g.d`.
+    fn precise_direction(&mut self) -> f64 {
+        self.work += 1.0;
+        self.d.copy_from_slice(&self.g);
+        self.solver.solve_in_double(&mut self.d);
+        self.d.iter_mut().for_each(|d| *d = -*d);
+        dot(&self.g, &self.d)
     }
 
     /// `d = -H g`; returns the slope `g.d`.

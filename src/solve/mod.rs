@@ -22,7 +22,7 @@ pub use allowance::Allowance;
 pub use cholesky::{Cholesky, MOST_ENTRIES};
 pub use eigen::{Modes, slowest_modes};
 pub use gradients::Gradients;
-pub use minimise::{Minimiser, Outcome, Strategy, Way};
+pub use minimise::{Clearance, Minimiser, Outcome, Strategy, Way};
 pub use ordering::{elimination, nested_dissection};
 pub use problem::Problem;
 pub use rung::Rung;

@@ -71,3 +71,23 @@ fn derivatives_do_not_need_a_factor() {
     let (a, b) = (answer(&mut direct), answer(&mut iterative));
     assert!(largest(a.iter().zip(&b).map(|(a, b)| a - b)) < 1e-6);
 }
+
+/// Stiffnesses a million times apart: a solve by iteration that stops early must not pass for the answer.
+#[test]
+fn converged_means_the_same_with_either_solver() {
+    let scene = |linear: &str| {
+        format!(
+            "[mesh.block]\nsize = [0.06, 0.04, 0.02]\ncells = [6, 4, 4]\nlayers = [[\"hard\", 0.34]]\n[[tissue]]\nregions = [\"hard\"]\nE = 1e9\nnu = 0.45\n\
+             [[tissue]]\nE = 1e3\nnu = 0.45\n[[bone]]\nname = \"skull\"\nnodes = \"x_min\"\ndrive = \"held\"\n[[load]]\nname = \"push\"\nat = [0.05, 0.02, 0.02]\n\
+             radius = 0.01\nforce = [0, 0.05, -0.05]\n[solver]\nlinear = \"{linear}\"\n"
+        )
+    };
+    let skin = |linear: &str| {
+        let mut sim = crate::common::sim(&scene(linear));
+        sim.initialise().expect("an equilibrium");
+        crate::common::get(&sim, "skin.position")
+    };
+    let (direct, iterative) = (skin("direct"), skin("iterative"));
+    let off = crate::common::largest(direct.iter().zip(&iterative).map(|(a, b)| a - b));
+    assert!(off < 1e-6, "{off:.1e} m apart");
+}
