@@ -22,13 +22,13 @@ pub struct Bake {
     #[arg(short, long, default_value = "face.cutis")]
     out: PathBuf,
     /// Edge of the lattice cell, mm
-    #[arg(long, default_value_t = 4.0)]
+    #[arg(long, default_value_t = 4.0, allow_negative_numbers = true)]
     edge: f64,
     /// Threshold of the skin, HU
     #[arg(long, default_value_t = -300.0, allow_negative_numbers = true)]
     skin: f64,
     /// Threshold of bone, HU
-    #[arg(long, default_value_t = 250.0)]
+    #[arg(long, default_value_t = 250.0, allow_negative_numbers = true)]
     bone: f64,
     /// Region of interest, two corners in mm (LPS): x0 y0 z0 x1 y1 z1; found from the nose tip if left out
     #[arg(long, num_args = 6, allow_negative_numbers = true, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"])]
@@ -51,6 +51,18 @@ impl Bake {
         let labels = self.labels.as_deref().map(|path| io::read_labels(path, &map, &mut notes)).transpose()?;
         for note in &notes {
             eprintln!("warning: {note}");
+        }
+        for (option, mm) in [("--roi", &self.roi), ("--mouth", &self.mouth)] {
+            if mm.iter().flatten().any(|v| !v.is_finite()) {
+                return Err(format!(
+                    "{option} takes six finite numbers in mm; found {:?}",
+                    mm.as_deref().unwrap_or_default()
+                )
+                .into());
+            }
+        }
+        if !(self.edge.is_finite() && self.edge > 0.0) {
+            return Err(format!("--edge takes a length above 0 in mm; found {} mm", self.edge).into());
         }
         let corners = |mm: &Option<Vec<f64>>| {
             mm.as_ref().map(|c| [Vec3::new(c[0], c[1], c[2]) * 1e-3, Vec3::new(c[3], c[4], c[5]) * 1e-3])

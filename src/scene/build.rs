@@ -26,6 +26,8 @@ const TOLERANCE: f64 = 1e-7;
 /// accuracy, of each of them, of which there may be so many.
 const SOLVES: u32 = 5;
 const MOST_PIECES: u32 = 256;
+/// Spectral radius up to which generalised-alpha damps enough for laws that are not linear: no swing tried gained energy.
+const MOST_RHO: f64 = 0.8;
 /// Round-off of the solver that the estimate of an error in time can bear, in units of its accuracy.
 const NOISE: f64 = 0.1;
 
@@ -175,12 +177,21 @@ impl Builder<'_> {
         let inertia = match inertia {
             Some(spec) => {
                 terms.push(Box::new(Inertia { m: masses() }));
+                let scheme = self.scheme(spec)?;
+                if matches!(scheme, Scheme::GeneralisedAlpha { rho } if rho > MOST_RHO)
+                    && terms.iter().any(|t| !t.is_quadratic())
+                {
+                    warnings.push(format!(
+                        "{scheme:?} damps almost nothing that the steps do not resolve: under a law that is not linear such motions \
+                         may gain energy without bound; take rho up to {MOST_RHO}, or bdf2"
+                    ));
+                }
                 let start = self.text.choice("inertia", "start", &spec.start)?.unwrap_or("equilibrium");
                 let reduction = self.reduction(spec, file, &mesh, &bones, &terms, n_history)?;
                 Some(sim::Inertia {
                     m: masses(),
                     start_at_rest: start == "rest",
-                    scheme: self.scheme(spec)?,
+                    scheme,
                     damping_mass: self.text.number("inertia", "damping_mass", &spec.damping_mass)?.unwrap_or(0.0),
                     accuracy: self.accuracy(spec, tolerance)?,
                     reduction,
@@ -263,10 +274,20 @@ impl Builder<'_> {
             strategy,
             most_solves: most_solves.unwrap_or((pieces * SOLVES).saturating_mul(max_iterations)),
             background,
-            identity: identity(self.text.0),
+            identity: identity(self.text.0)?,
             warnings,
         })?;
         let dt = run.as_ref().map(|run| self.text.number("run", "dt", &run.dt)).transpose()?.flatten();
+        for p in model.ports() {
+            let (low, high) = (p.min.unwrap_or(f64::NEG_INFINITY), p.max.unwrap_or(f64::INFINITY));
+            if let Some(k) = p.start.iter().position(|v| !(low..=high).contains(v)) {
+                let row =
+                    p.rows.get(k * p.rows.len() / p.len().max(1)).map_or(String::new(), |row| format!(" of `{row}`"));
+                let message =
+                    format!("`{}`{row} starts at {} {}; it takes {low} to {high}", p.name, p.start[k], p.unit);
+                return Err(self.text.at(0, message));
+            }
+        }
         let tracks = self.tracks(file, model.ports())?;
         Ok((model, Programme { dt: dt.unwrap_or(0.1), end, tracks }))
     }

@@ -356,7 +356,8 @@ impl SceneFile {
 
 /// The message of the parser in words of a scene instead of those of the program's types.
 fn plain(message: &str) -> String {
-    const WORDS: [(&str, &str); 15] = [
+    const WORDS: [(&str, &str); 16] = [
+        ("invalid type: map, expected a sequence", "found one table, wanted an array of tables: [[name]]"),
         (
             "data did not match any variant of untagged enum Constant",
             "wanted a number, or an array of numbers for `ogden`",

@@ -11,6 +11,8 @@ use crate::sim::Marker;
 
 /// Young's modulus below which no tissue is, Pa.
 const SOFTEST: f64 = 100.0;
+/// Diagonals that a head, or a part of one, may have, m.
+const SIZES: std::ops::Range<f64> = 2e-3..3.0;
 /// Distance of a marker from the skin beyond which it may be meant for another place, m.
 const OFF_SKIN: f64 = 3e-3;
 
@@ -70,6 +72,10 @@ impl Builder<'_> {
                 marker.name,
                 1e3 * marker.off
             ));
+        }
+        // Mesh files are told of where they are read.
+        if file.mesh.get_ref().file.is_none() && !SIZES.contains(&size) {
+            told.push(format!("the tissue measures {size} m from corner to corner, no head's size: metres are wanted"));
         }
         // A block has sets for all its sides; nobody holds them all.
         if file.mesh.get_ref().block.is_none() {

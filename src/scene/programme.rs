@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::build::Builder;
 use super::file::SceneFile;
-use crate::port::{Causality, Port};
+use crate::port::{Causality, Port, Type};
 
 /// Part of a programme that is no step of its own.
 const ROUND_OFF: f64 = 1e-9;
@@ -96,7 +96,9 @@ impl Builder<'_> {
     pub(super) fn tracks(&self, file: &SceneFile, ports: &[Port]) -> Result<Vec<Track>, SceneError> {
         let mut tracks: Vec<Track> = Vec::new();
         for frame in &file.keyframe {
-            let keyed = |p: &Port| matches!(p.causality, Causality::Input | Causality::TunableParameter);
+            let keyed = |p: &Port| {
+                matches!(p.causality, Causality::Input | Causality::TunableParameter) && p.ty == Type::Float64
+            };
             let inputs = || ports.iter().filter(|p| keyed(p));
             let wanted = frame.port.get_ref();
             let (port, p) = ports
@@ -121,6 +123,19 @@ impl Builder<'_> {
             if let Some(bad) = values.iter().find(|v| !(low..=high).contains(*v)) {
                 let message = format!("`value` of `{wanted}` is {bad} {}; it takes {low} to {high}", p.unit);
                 return Err(self.text.at(frame.value.span().start, message));
+            }
+            let poses = ["bone.translation", "bone.rotation"].contains(&wanted.as_str());
+            let forces = ["bone.force", "bone.torque"].contains(&wanted.as_str());
+            if poses || forces {
+                let drive = if poses { "pose" } else { "force" };
+                let set = (offset / 3..(offset + len) / 3)
+                    .filter(|b| values[3 * b - offset..][..3].iter().any(|v| *v != 0.0));
+                let is_other = |b: &usize| file.bone[*b].drive.as_ref().map_or("pose", |d| d.get_ref()) != drive;
+                if let Some(b) = set.into_iter().find(is_other) {
+                    let name = file.bone[b].name.get_ref();
+                    let message = format!("`{wanted}` of bone `{name}` cannot be set: its `drive` is not \"{drive}\"");
+                    return Err(self.text.at(frame.value.span().start, message));
+                }
             }
             let t = self.text.checked("keyframe", "t", &frame.t)?;
             let same =

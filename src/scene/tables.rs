@@ -6,6 +6,8 @@ use std::fmt::Write as _;
 
 use toml::{Table, Value};
 
+use super::SceneError;
+
 /// What tells where the tissue and its skin come from: both stand for themselves in a model.
 const SHAPE: [&str; 2] = ["mesh", "skin"];
 /// What changes neither the model nor its interface.
@@ -13,18 +15,21 @@ const ASIDE: [&str; 3] = ["name", "run", "keyframe"];
 /// Keys of `[mesh]` that say what is made of a mesh once it was read.
 const OF_ELEMENTS: [&str; 2] = ["order", "curved"];
 
-/// The tables of a scene that was read before.
-fn tables(text: &str) -> Table {
-    text.parse().expect("the scene was read, so it is TOML")
+/// The tables of a scene. Numbers beyond what TOML can hold are refused here, though a key may take them.
+fn tables(text: &str) -> Result<Table, SceneError> {
+    text.parse().map_err(|e: toml::de::Error| SceneError::Syntax(e.to_string().trim_end().to_owned()))
 }
 
 /// What identifies a model beside its mesh: everything that the scene says of it, in one spelling.
-pub(super) fn identity(text: &str) -> String {
-    let mut scene = tables(text);
+///
+/// # Errors
+/// [`SceneError::Syntax`].
+pub(super) fn identity(text: &str) -> Result<String, SceneError> {
+    let mut scene = tables(text)?;
     SHAPE.iter().chain(&ASIDE).for_each(|key| drop(scene.remove(*key)));
     let mut out = String::new();
     spell(&Value::Table(scene), &mut out);
-    out
+    Ok(out)
 }
 
 /// One spelling for each value: keys in order, all numbers alike.
@@ -61,14 +66,17 @@ fn spell(value: &Value, out: &mut String) {
 }
 
 /// The same scene with its tissue read from `file`, which carries its skin, too.
-pub fn packed(text: &str, file: &str) -> String {
-    let mut scene = tables(text);
+///
+/// # Errors
+/// [`SceneError::Syntax`].
+pub fn packed(text: &str, file: &str) -> Result<String, SceneError> {
+    let mut scene = tables(text)?;
     let given = scene.remove("mesh").and_then(|mesh| mesh.as_table().cloned()).unwrap_or_default();
     let mut mesh = Table::from_iter([("file".to_owned(), Value::String(file.to_owned()))]);
     mesh.extend(given.into_iter().filter(|(key, _)| OF_ELEMENTS.contains(&key.as_str())));
     scene.remove("skin");
     scene.insert("mesh".to_owned(), Value::Table(mesh));
-    toml::to_string(&scene).expect("tables that were read can be written")
+    Ok(toml::to_string(&scene).expect("tables that were read can be written"))
 }
 
 #[cfg(test)]
@@ -86,11 +94,17 @@ mod tests {
             "mesh.file = \"a.vtu\"\ntissue = [{ nu = 0.45, E = 15e3 }]\nbone = [\n{ name = 'skull' },\n]\n".to_owned(),
         ];
         for text in &same {
-            assert_eq!(identity(text), identity(base), "{text}");
+            assert_eq!(identity(text).expect(text), identity(base).expect(base), "{text}");
         }
         for other in [base.replace("15e3", "15001"), base.replace("skull", "jaw"), format!("{base}[gravity]\n")] {
-            assert_ne!(identity(&other), identity(base), "{other}");
+            assert_ne!(identity(&other).expect("tables"), identity(base).expect(base), "{other}");
         }
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_refused() {
+        let scene = "[[tissue]]\nE = 9223372036854975807\n";
+        assert!(identity(scene).is_err() && packed(scene, "model.cutis").is_err());
     }
 
     #[test]
@@ -103,7 +117,7 @@ mod tests {
             "[\"mesh\"]\nfile = '''\n[mesh]\nblk.vtu'''\norder = 2\n",
         ] {
             let scene = format!("{mesh}[[tissue]]\nE = 15e3\n[[bone]]\nname = \"mesh [skin]\"\n");
-            let found = tables(&packed(&scene, "model.cutis"));
+            let found = tables(&packed(&scene, "model.cutis").expect("tables")).expect("tables");
             let mesh = found["mesh"].as_table().expect("a table");
             assert_eq!(mesh.len(), 2, "{found}");
             assert_eq!((mesh["file"].as_str(), mesh["order"].as_integer()), (Some("model.cutis"), Some(2)), "{found}");

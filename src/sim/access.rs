@@ -21,12 +21,14 @@ impl Sim {
         Ok(())
     }
 
-    /// Whether [`Sim::set_f64`] would take these values.
+    /// Whether [`Sim::set_f64`] would take these values, and [`Sim::initialise`] after it if that is yet to come.
     ///
     /// # Errors
-    /// The same.
+    /// As for [`Sim::set_f64`], and [`SimError::NotAtRest`].
     pub fn check_f64(&self, port: usize, offset: usize, values: &[f64]) -> Result<(), SimError> {
-        self.settable(port, offset, values).map(drop)
+        let first = self.settable(port, offset, values)?;
+        let moved = (first..).zip(values).filter(|(_, value)| **value != 0.0);
+        moved.map(|(k, _)| k).try_for_each(|k| self.check_start(self.model.ports()[port].slot, k))
     }
 
     /// Where the values go among the inputs.
@@ -39,7 +41,6 @@ impl Sim {
         let first = first + offset;
         for (k, &value) in (first..).zip(values).filter(|(_, value)| **value != 0.0) {
             bone_of_input(&self.model, k, value)?;
-            self.check_start(p.slot, k)?;
         }
         Ok(first)
     }

@@ -123,8 +123,8 @@ pub(super) fn is_swallowed(model: &Model, k: usize, x: &[Vec3]) -> bool {
     let mesh = model.mesh();
     let contact = &model.parts().contacts[k];
     let place = contact.motion(&mesh.nodes, x);
-    let points: Vec<Vec3> = contact.axis.iter().map(place).collect();
-    let Some((low, high)) = points.iter().map(|p| (*p, *p)).reduce(|(l, h), (p, _)| (l.inf(&p), h.sup(&p))) else {
+    let points = || contact.axis.iter().map(&place);
+    let Some((low, high)) = points().map(|p| (p, p)).reduce(|(l, h), (p, _)| (l.inf(&p), h.sup(&p))) else {
         return false;
     };
     mesh.tets.iter().any(|tet| {
@@ -132,7 +132,7 @@ pub(super) fn is_swallowed(model: &Model, k: usize, x: &[Vec3]) -> bool {
         let from = corners[0].inf(&corners[1]).inf(&corners[2].inf(&corners[3]));
         let to = corners[0].sup(&corners[1]).sup(&corners[2].sup(&corners[3]));
         let near = (0..3).all(|c| from[c] <= high[c] && low[c] <= to[c]);
-        near && points.iter().any(|p| holds(&corners, p))
+        near && points().any(|p| holds(&corners, &p))
     })
 }
 

@@ -1,7 +1,7 @@
 //! What an accepted or refused step must not hide: where tissue is worst, whether it snapped, whether it came back.
 
 use super::model::Model;
-use super::state::{State, rest_inputs};
+use super::state::{State, are_at_rest};
 use crate::fem::{At, Term};
 use crate::math::Vec3;
 use crate::mesh::signed_volume;
@@ -10,6 +10,8 @@ use crate::mesh::signed_volume;
 const SQUEEZED: f64 = 0.1;
 /// Share of the elastic energy whose loss nothing explains that is a snap.
 const SNAP: f64 = 0.5;
+/// Motion of a snap in sizes of the tissue; less may be round-off that settles.
+const VISIBLE: f64 = 0.01;
 /// Share of the work of the bones that the trapezoidal rule may be wrong by before energies are looked at.
 const ROUGH: f64 = 0.2;
 /// Share of the energy that is its round-off.
@@ -122,7 +124,8 @@ pub(super) fn snapped(
     after: &[Vec3],
     elastic: impl Fn(&[Vec3]) -> f64,
 ) -> Option<String> {
-    if !balance.is_suspicious() {
+    let (low, high) = before.iter().fold((before[0], before[0]), |(l, h), x| (l.inf(x), h.sup(x)));
+    if !balance.is_suspicious() || distance(before, after) < VISIBLE * (high - low).norm() {
         return None;
     }
     let (had, has) = (elastic(before), elastic(after));
@@ -137,7 +140,7 @@ pub(super) fn snapped(
 /// How far from rest the tissue is although every input is at rest, m; `None` where that proves nothing.
 pub(super) fn hangs(model: &Model, state: &State) -> Option<f64> {
     let is_elastic = !model.remembers() && !model.is_quadratic();
-    if !is_elastic || state.inputs != rest_inputs(model) {
+    if !is_elastic || !are_at_rest(model, &state.inputs) {
         return None;
     }
     let moved = distance(&state.config.x, &model.mesh().nodes);

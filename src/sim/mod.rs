@@ -374,6 +374,7 @@ impl Sim {
             self.state.config.x[a as usize] = x[a as usize];
         }
         self.state.linearisation = None;
+        self.state.outputs.least = State::UNSEEN;
         self.state.motion.memory.fill([crate::math::Vec3::zeros(); 2]);
         self.state.motion.dt = 0.0;
         self.work.kept.origin = Origin::Unknown;

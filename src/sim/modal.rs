@@ -299,6 +299,7 @@ pub(super) fn advance(
         *a = if dt > 0.0 { (v - *a) / dt } else { Vec3::zeros() };
     }
     state.partial = true;
+    state.outputs.least = State::UNSEEN;
     warn_of_jumps(model, before, worst_jump(model, &state.config.x), &mut report);
     modal.warn_of_gap(dt, &mut report);
     state.t += dt;

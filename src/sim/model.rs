@@ -12,7 +12,7 @@ use crate::fem::{Assembly, At, Dofs, Elimination, Embedding, Term, Touch};
 use crate::math::{Mat3, Vec3, svd};
 use crate::mesh::{FineSkin, TetMesh};
 use crate::port::Port;
-use crate::solve::{Rung, Strategy, nested_dissection};
+use crate::solve::{Clearance, Rung, Strategy, nested_dissection};
 
 /// How a bone moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -210,6 +210,7 @@ pub struct Model {
     skin: Skin,
     osteotomy: Vec<(u32, u32)>,
     folds: bool,
+    clearance: Clearance,
     token: Arc<str>,
 }
 
@@ -241,7 +242,8 @@ impl Model {
         }
         let folds = folds(&parts.terms, &parts.mesh.nodes, &parts.start, parts.n_history);
         let token = token(&parts, &ports).into();
-        Ok(Model { parts, ports, sources, dofs, skin, osteotomy, folds, token })
+        let clearance = Clearance(CLEARANCE * smallest_altitude(&parts.mesh));
+        Ok(Model { parts, ports, sources, dofs, skin, osteotomy, folds, clearance, token })
     }
 
     /// The same without one rung of recovery, to measure what it buys.
@@ -263,6 +265,11 @@ impl Model {
     /// Whether its elements may turn inside out at a finite energy.
     pub(super) fn folds(&self) -> bool {
         self.folds
+    }
+
+    /// How far nodes may go before an element can have turned inside out.
+    pub(super) fn clearance(&self) -> Clearance {
+        self.clearance
     }
 
     /// Whether this node moves the shape of a contact, and is of no tissue.
@@ -290,6 +297,10 @@ impl Model {
     /// The interface, ascending by value reference.
     pub fn ports(&self) -> &[Port] {
         &self.ports
+    }
+    /// Index of the port of this name, for example `bone.rotation`.
+    pub fn port(&self, name: &str) -> Option<usize> {
+        self.ports.iter().position(|p| p.name == name)
     }
     /// Where the values of a port are.
     pub(super) fn source(&self, port: usize) -> Source {
@@ -364,6 +375,21 @@ pub fn osteotomy_edges(mesh: &TetMesh, bones: &[Bone]) -> Vec<(u32, u32)> {
     edges.sort_unstable();
     edges.dedup();
     edges
+}
+
+/// Share of the smallest altitude at rest that nodes may go: half of it divides among two ends, and stretches up to 3 in both
+/// directions of a face make a deformed altitude a ninth of what det F says.
+const CLEARANCE: f64 = 0.05;
+
+/// Smallest altitude of the tetrahedra's corners at rest, m.
+fn smallest_altitude(mesh: &TetMesh) -> f64 {
+    let of = |tet: &[u32; 4]| {
+        let x = tet.map(|a| mesh.nodes[a as usize]);
+        let face = |[i, j, k]: [usize; 3]| (x[j] - x[i]).cross(&(x[k] - x[i])).norm();
+        let largest = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].map(face).into_iter().fold(0.0, f64::max);
+        6.0 * crate::mesh::signed_volume(x) / largest
+    };
+    mesh.tets.iter().map(of).fold(f64::INFINITY, f64::min)
 }
 
 /// Every connected piece of tissue must have three held nodes that are not in a line.

@@ -84,7 +84,7 @@ const SOFTEST: f64 = 1e-3;
 const FARTHEST: f64 = 1e3;
 const MOST_TURNED: f64 = 1e2;
 const STRONGEST: f64 = 1e6;
-const MOST_PRESSED: f64 = 1e9;
+const MOST_PRESSED: f64 = 1e12;
 const HEAVIEST: f64 = 1e4;
 
 /// Where the values of a port are.

@@ -30,6 +30,8 @@ pub(super) struct Outputs {
     pub residual: f64,
     pub converged: bool,
     pub kinetic: f64,
+    /// Smallest det F; [`State::UNSEEN`] where nobody looked.
+    pub least: f64,
     /// Length of the step, s.
     pub dt: f64,
 }
@@ -110,6 +112,9 @@ const MAGIC: &[u8; 8] = b"cutis-st";
 const FORMAT: u32 = 5;
 
 impl State {
+    /// A det F that says nothing.
+    pub(super) const UNSEEN: f64 = f64::NEG_INFINITY;
+
     /// At rest, t = 0, inputs at their start values.
     pub(super) fn start(model: &Model) -> State {
         let parts = model.parts();
@@ -133,6 +138,7 @@ impl State {
                 residual: 0.0,
                 converged: false,
                 kinetic: 0.0,
+                least: State::UNSEEN,
                 dt: 0.0,
             },
             most_solves: parts.most_solves,
@@ -190,7 +196,7 @@ impl State {
         put_vectors(&mut body, &o.reaction_torque);
         body.u32(o.iterations);
         body.u32(u32::from(o.converged));
-        [o.residual, o.kinetic, o.dt].into_iter().for_each(|v| body.f64(v));
+        [o.residual, o.kinetic, o.least, o.dt].into_iter().for_each(|v| body.f64(v));
         body.u32(u32::from(self.linearisation.is_some()));
         if let Some(l) = &self.linearisation {
             put_linearisation(&mut body, l);
@@ -251,7 +257,7 @@ impl State {
         let reaction_force = take_vectors(&mut r, "reactions", n_bones)?;
         let reaction_torque = take_vectors(&mut r, "reactions", n_bones)?;
         let (iterations, converged) = (r.u32()?, r.u32()? != 0);
-        let [residual, kinetic, dt] = [r.f64()?, r.f64()?, r.f64()?];
+        let [residual, kinetic, least, dt] = [r.f64()?, r.f64()?, r.f64()?, r.f64()?];
         let linearisation = match r.u32()? {
             0 => None,
             _ => Some(Arc::new(take_linearisation(&mut r, model)?)),
@@ -265,7 +271,7 @@ impl State {
             0 => None,
             _ => Some(Arc::new(take_before(&mut r, model)?)),
         };
-        let outputs = Outputs { reaction_force, reaction_torque, iterations, residual, converged, kinetic, dt };
+        let outputs = Outputs { reaction_force, reaction_torque, iterations, residual, converged, kinetic, least, dt };
         let state = State {
             model: model.shared_token(),
             t,
@@ -288,15 +294,19 @@ impl State {
 
 /// The inputs under which the rest state is in equilibrium: no motion, no load; parameters as they start.
 pub(super) fn rest_inputs(model: &Model) -> Vec<f64> {
+    (0..model.parts().layout.len()).map(|k| rest_input(model, k)).collect()
+}
+
+/// Whether these are those inputs.
+pub(super) fn are_at_rest(model: &Model, inputs: &[f64]) -> bool {
+    inputs.iter().enumerate().all(|(k, value)| *value == rest_input(model, k))
+}
+
+fn rest_input(model: &Model, k: usize) -> f64 {
     let parts = model.parts();
-    let mut rest = vec![0.0; parts.layout.len()];
-    let tunable = 0..parts.tunable.len();
-    rest[tunable.clone()].copy_from_slice(&parts.start[tunable]);
-    if let Some(first) = parts.layout.first(crate::port::Slot::BonePivot) {
-        let end = first + 3 * parts.bones.len();
-        rest[first..end].copy_from_slice(&parts.start[first..end]);
-    }
-    rest
+    let pivots = parts.layout.first(crate::port::Slot::BonePivot).map(|first| first..first + 3 * parts.bones.len());
+    let is_parameter = k < parts.tunable.len() || pivots.is_some_and(|pivots| pivots.contains(&k));
+    if is_parameter { parts.start[k] } else { 0.0 }
 }
 
 fn put_vectors(w: &mut Writer, vectors: &[Vec3]) {

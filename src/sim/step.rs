@@ -19,7 +19,7 @@ use super::past::{Kept, Origin};
 use super::recover::untangle;
 use super::scheme::Scheme;
 use super::start::accelerations;
-use super::state::State;
+use super::state::{State, are_at_rest};
 use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
 use crate::math::{Mat3, Pose, Vec3, best_fit};
@@ -38,7 +38,7 @@ const BUDGET: u32 = 4;
 /// torture scenes that has an answer wastes more than 164 solves' worth.
 const PATIENCE: (f64, f64) = (240.0, 20.0);
 /// Most of one piece, in the same.
-const MOST_WORK: (f64, f64) = (1000.0, 40.0);
+const MOST_WORK: (f64, f64) = (400.0, 40.0);
 /// After a piece that succeeded the next one may be this much larger.
 const GROWTH: f64 = 2.0;
 /// Change of ln dt beyond which the stiffness with inertia is factored anew.
@@ -52,10 +52,12 @@ const RIGID_REMAINDER: f64 = 0.5;
 /// Turns smaller than this (rad, squared) leave the factor as it is.
 const FRAME_THRESHOLD: f64 = 0.05 * 0.05;
 
+/// Largest turn of a bone that a piece of a step makes, rad; a right angle and some go in one.
+const MOST_TURN: f64 = 2.2;
 /// A bound of |F - 1| up to which no det F can be below 0.1, with some room for elements that are not linear.
 const SMALL_STRAIN: f64 = 0.4;
 /// Growth of that bound after which the elements of a table are looked at again.
-const LOOK_AGAIN: f64 = 1.2;
+const LOOK_AGAIN: f64 = 2.0;
 
 /// What a step did.
 #[derive(Debug, Clone, PartialEq)]
@@ -301,9 +303,15 @@ pub(super) fn advance(
     if pace.is_some() && state.motion.next_dt > 0.0 {
         piece = even_part(1.0, (state.motion.next_dt / dt).max(smallest));
     }
+    // Beyond half a turn a pose does not say which way it came.
+    let turn = largest_turn(model, state);
+    let turn_part = if turn > MOST_TURN { even_part(1.0, (MOST_TURN / turn).max(smallest)) } else { 1.0 };
     let mut spent_before = 0;
     let mut surely = true;
-    let least_before = if model.folds() { min_det_f(model, &work.config.x) } else { f64::INFINITY };
+    let least_before = match state.outputs.least {
+        least if least.is_finite() => least,
+        _ => min_det_f(model, &work.config.x),
+    };
     let mut least = least_before;
     let only_bones = moves_only_bones(model, state);
     let allowance = |(solves, factors): (f64, f64)| match work.minimiser.work_of_a_factor() {
@@ -317,7 +325,7 @@ pub(super) fn advance(
         let approach = Approach { model, from: &state.applied, to: &state.inputs, pivots, config, done, smallest };
         let (part, is_sure) = approach.part(inputs, before);
         surely &= is_sure;
-        piece = piece.min(part);
+        piece = piece.min(part).min(turn_part);
         let to: f64 = if done + piece >= 1.0 - ROUND_OFF { 1.0 } else { done + piece };
         for ((now, from), last) in work.inputs.iter_mut().zip(&state.applied).zip(&state.inputs) {
             *now = if to == 1.0 { *last } else { from + to * (last - from) };
@@ -365,8 +373,13 @@ pub(super) fn advance(
                     || patience <= 0.0
                     || spent > BUDGET * model.parts().strategy.max_iterations
                 {
-                    let cuts = (1.0 / (to - done)).round() as u32;
                     let is_final = source.is_final();
+                    if !is_final && dt > 0.0 && is_way_from_rest_another(model, state) {
+                        if let Some(again) = redo_from_rest(model, state, work, &report, dt) {
+                            return Ok(again);
+                        }
+                    }
+                    let cuts = (1.0 / (to - done)).round() as u32;
                     let place = worst_place(model, &work.config.x).map(Box::new);
                     let spent = report.iterations;
                     let error = SimError::Solve { t: state.t, dt, cuts, spent, reached: done, place, source };
@@ -383,8 +396,10 @@ pub(super) fn advance(
             }
         }
     }
-    let least_before = if model.folds() { least_before } else { min_det_f(model, &state.config.x) };
-    warn_of_squeezing(model, least_before, min_det_f(model, &work.config.x), &work.config.x, &mut report.warnings);
+    if !model.folds() {
+        least = min_det_f(model, &work.config.x);
+    }
+    warn_of_squeezing(model, least_before, least, &work.config.x, &mut report.warnings);
     if !surely {
         report.warnings.push("a contact's shape goes so far in this step that it may have passed tissue".into());
     }
@@ -394,6 +409,7 @@ pub(super) fn advance(
     warn_of_jumps(model, worst_jump(model, &state.config.x), worst_jump(model, &work.config.x), &mut report);
     state.t += dt;
     accept(model, state, work, &report, dt);
+    state.outputs.least = least;
     state.linearisation = linearisation;
     let piece = work.last.expect("the step had a last piece");
     let Workspace { ahead, minimiser, config, inputs, remembered, x_tilde, kept, .. } = work;
@@ -407,6 +423,36 @@ pub(super) fn advance(
         settle(model, state, work, &mut report, moved);
     }
     Ok(report)
+}
+
+/// Whether a step that has no answer from here may have one from rest: quasi-static tissue without a past, and shapes, which
+/// may have come round the body, only where they are at rest again.
+fn is_way_from_rest_another(model: &Model, state: &State) -> bool {
+    let shapes = !model.parts().contacts.is_empty() && !are_at_rest(model, &state.inputs);
+    !model.remembers() && !model.is_quadratic() && !shapes && !are_at_rest(model, &state.applied)
+}
+
+/// The step again from rest along the inputs, told; `None` if that has no answer either.
+fn redo_from_rest(
+    model: &Arc<Model>,
+    state: &mut State,
+    work: &mut Workspace,
+    so_far: &StepReport,
+    dt: f64,
+) -> Option<StepReport> {
+    let mut fresh = State::start(model);
+    (fresh.t, fresh.most_solves) = (state.t, state.most_solves);
+    fresh.inputs.copy_from_slice(&state.inputs);
+    let mut report = advance(model, &mut fresh, work, 0.0, None).ok()?;
+    report.iterations += so_far.iterations;
+    report.factorisations += so_far.factorisations;
+    fresh.t += dt;
+    (fresh.outputs.dt, fresh.outputs.iterations) = (dt, report.iterations);
+    report.warnings.push(
+        "no way was found from the last state: the answer is the one that the tissue reaches from rest under these inputs".into(),
+    );
+    *state = fresh;
+    Some(report)
 }
 
 /// Takes tissue that hangs off rest, `moved` by so much (m) although every input is at rest, back where that is lower.
@@ -440,19 +486,25 @@ fn settle(model: &Arc<Model>, state: &mut State, work: &mut Workspace, report: &
     *state = fresh;
 }
 
+/// The largest change of a bone's rotation vector in the step that `state` is about to make, rad.
+fn largest_turn(model: &Model, state: &State) -> f64 {
+    let Some(first) = model.parts().layout.first(Slot::BoneRotation) else { return 0.0 };
+    let of = |b: usize| input3(&state.inputs, Some(first), b) - input3(&state.applied, Some(first), b);
+    (0..model.parts().bones.len()).map(|b| of(b).norm()).fold(0.0, f64::max)
+}
+
 /// Whether nothing but bones that are driven by pose or node by node moves in the step that `state` is about to make.
 fn moves_only_bones(model: &Model, state: &State) -> bool {
     let layout = &model.parts().layout;
-    let bones = model.parts().bones.len();
-    let mut moving: Vec<std::ops::Range<usize>> = Vec::new();
-    for slot in [Slot::BoneTranslation, Slot::BoneRotation] {
-        moving.extend(layout.first(slot).map(|first| first..first + 3 * bones));
-    }
-    for (b, bone) in model.parts().bones.iter().enumerate() {
-        moving.extend(layout.first(Slot::BoneNodal(b as u32)).map(|first| first..first + 3 * bone.nodes.len()));
-    }
-    let mut changed = (0..state.inputs.len()).filter(|&k| state.inputs[k] != state.applied[k]);
-    changed.all(|k| moving.iter().any(|range| range.contains(&k)))
+    let bones = &model.parts().bones;
+    let within = |slot: Slot, nodes: usize, k: usize| {
+        layout.first(slot).is_some_and(|first| (first..first + 3 * nodes).contains(&k))
+    };
+    let moves_a_bone = |k: usize| {
+        [Slot::BoneTranslation, Slot::BoneRotation].into_iter().any(|slot| within(slot, bones.len(), k))
+            || bones.iter().enumerate().any(|(b, bone)| within(Slot::BoneNodal(b as u32), bone.nodes.len(), k))
+    };
+    (0..state.inputs.len()).filter(|&k| state.inputs[k] != state.applied[k]).all(moves_a_bone)
 }
 
 /// Takes over where `work` has come to.
@@ -538,6 +590,7 @@ fn look_up(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> R
     state.config.poses.copy_from_slice(&work.config.poses);
     map.place_seen(model, &state.inputs, &work.pivots, &mut state.config);
     state.partial = true;
+    state.outputs.least = State::UNSEEN;
     warn_of_jumps(model, before, worst_jump(model, &state.config.x), &mut report);
     state.t += dt;
     state.applied.copy_from_slice(&state.inputs);
@@ -617,7 +670,7 @@ struct Cut {
     part: f64,
     /// The smallest part that a step is cut into.
     smallest: f64,
-    /// Smallest det F where it starts; +inf where no element can turn inside out.
+    /// Smallest det F where it starts; a bound where no element can turn inside out.
     least: f64,
     /// Whether nothing but bones moves in it.
     only_bones: bool,
@@ -696,8 +749,8 @@ fn step_piece(
     let avoid_inversion = !problem.is_quadratic() && model.folds() && strategy.has(Rung::Inversion) && !inverted_before;
     let way = match (avoid_inversion, may_cut) {
         (false, _) => Way::Any,
-        (true, false) => Way::Watched,
-        (true, true) => Way::Upright,
+        (true, false) => Way::Watched(model.clearance()),
+        (true, true) => Way::Upright(model.clearance()),
     };
     let outcome = match minimiser.minimise_by(way, &problem, config) {
         // A small piece of load alone, predicted beyond what the law allows: go there from where the tissue is.
@@ -712,7 +765,9 @@ fn step_piece(
     // A piece that is not taken may leave another factor behind than the state remembers.
     let outcome = outcome.inspect_err(|_| *factored = None)?;
     report.count(&outcome);
-    *least = if model.folds() { min_det_f(model, &config.x) } else { f64::INFINITY };
+    if model.folds() {
+        *least = min_det_f(model, &config.x);
+    }
     if avoid_inversion && *least <= 0.0 && (may_cut || !parts.may_invert) {
         *factored = None;
         return Err(SolveError::Inverts { iterations: 0 }.into());
@@ -725,7 +780,14 @@ fn step_piece(
                       default) decide it",
         );
     }
-    if cut.only_bones && !problem.is_quadratic() && !model.remembers() && !untangled && dt > 0.0 {
+    // What a shape lets go of is no snap.
+    if cut.only_bones
+        && parts.contacts.is_empty()
+        && !problem.is_quadratic()
+        && !model.remembers()
+        && !untangled
+        && dt > 0.0
+    {
         let work = [work_before, bones_work(minimiser)];
         let balance = Balance { before: potential, work, after: outcome.energy };
         let elastic = |x: &[Vec3]| parts.terms.iter().map(|t| t.strain(&at, x).energy).sum();

@@ -39,7 +39,7 @@ pub fn refused(scene: &str) -> String {
 }
 
 pub fn port(sim: &Sim, name: &str) -> usize {
-    sim.model().ports().iter().position(|p| p.name == name).unwrap_or_else(|| panic!("no port {name}"))
+    sim.model().port(name).unwrap_or_else(|| panic!("no port {name}"))
 }
 
 pub fn set(sim: &mut Sim, name: &str, offset: usize, values: &[f64]) {

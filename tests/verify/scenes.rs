@@ -197,6 +197,26 @@ fn values_beyond_sense_are_told() {
     assert!(message.contains("1.5") && message.contains("0 to 1"), "{message}");
 }
 
+/// What a host could not set, a scene cannot start with or come to.
+#[test]
+fn starts_and_keyframes_keep_to_the_range_of_their_input() {
+    let block = "[mesh.block]\nsize = [0.06, 0.04, 0.02]\ncells = [3, 2, 2]\n[[tissue]]\nE = 15e3\nnu = 0.45\n[[bone]]\nname = \"skull\"\n\
+                 nodes = \"x_min\"\ndrive = \"held\"\n[[bone]]\nname = \"jaw\"\nnodes = \"x_max\"\n";
+    let frame = |port: &str, row: &str, value: &str| {
+        format!("{block}[[keyframe]]\nt = 1.0\nport = \"{port}\"\nrow = \"{row}\"\nvalue = {value}\n")
+    };
+    for (scene, wanted) in [
+        (format!("{block}rotation = [0, 0, 1000]\n"), "`bone.rotation` of `jaw` starts at 1000 rad"),
+        (format!("{block}[gravity]\nacceleration = [0, 0, -98100000]\n"), "`gravity` starts at -98100000"),
+        (frame("bone.translation", "skull", "[0, 0, 0.01]"), "bone `skull` cannot be set: its `drive` is not \"pose\""),
+        (frame("solver.mostSolves", "jaw", "3"), "unknown input `solver.mostSolves`"),
+    ] {
+        let message = refused(&scene);
+        assert!(message.contains(wanted), "{wanted}: {message}");
+    }
+    sim(&frame("bone.translation", "skull", "[0, 0, 0]"));
+}
+
 #[test]
 fn presets_choose_the_element_that_they_need() {
     let names: Vec<&String> = cutis::scene::presets().keys().collect();

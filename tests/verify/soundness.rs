@@ -188,3 +188,50 @@ fn a_loose_start_says_what_a_dynamic_scene_can_do() {
     assert!(error.contains("start = \"rest\"") && !error.contains("add [inertia]"), "{error}");
     sim(&format!("{scene}start = \"rest\"\n")).initialise().expect("rest");
 }
+
+/// A pose says nothing of whole turns: a large turn in one step ends where small steps end, and comes back.
+#[test]
+fn large_turns_in_one_step_go_the_way_of_small_ones() {
+    let turned = |angles: &[f64]| {
+        let mut sim = sim(&block(""));
+        sim.initialise().expect("rest");
+        for &angle in angles {
+            set(&mut sim, "bone.rotation", 3, &[angle, 0.0, 0.0]);
+            sim.step(1.0).expect("a turn");
+        }
+        (sim.positions().to_vec(), get(&sim, "energy.elastic")[0])
+    };
+    let slow: Vec<f64> = (1..=10).map(|k| 0.5 * f64::from(k)).collect();
+    let ((x, E), (y, W)) = (turned(&[5.0]), turned(&slow));
+    assert!(largest(x.iter().zip(&y).map(|(x, y)| (x - y).norm())) < 1e-6, "{E:.2e} J against {W:.2e} J");
+    assert!(turned(&[5.0, 0.0]).1 < 1e-9);
+}
+
+/// Tissue that folded and finds no way back is at rest again once its inputs are.
+#[test]
+fn rest_has_an_answer_wherever_the_tissue_was() {
+    let mut sim = sim(&block(STABLE).replace("[0.06, 0.02, 0.02]", "[0.05, 0.02, 0.015]"));
+    sim.initialise().expect("rest");
+    for x in [-0.03, -0.035, -0.02, 0.0] {
+        set(&mut sim, "bone.translation", 3, &[x, 0.0, 0.0]);
+        let answer = sim.step(1.0);
+        assert!(x != 0.0 || answer.is_ok(), "{answer:?}");
+    }
+    assert!(off_rest(&sim) < 1e-6, "{:.1e} m off", off_rest(&sim));
+}
+
+/// Round-off that settles, and tissue that a shape lets go of, are no snaps.
+#[test]
+fn a_press_is_no_snap() {
+    let scene = format!(
+        "{}[[bone]]\nname = \"hand\"\nnodes = \"none\"\n[[contact]]\nname = \"ball\"\nbone = \"hand\"\npath = [[0.03, 0.01, 0.0305]]\nradius = 0.01\n",
+        block("")
+    );
+    let mut sim = sim(&scene);
+    sim.initialise().expect("rest");
+    for z in [-0.006, 0.0, 0.004, -0.006, 0.0] {
+        set(&mut sim, "bone.translation", 6, &[0.0, 0.0, z]);
+        let report = sim.step(1.0).expect("a press");
+        assert!(!says(&report, "snapped"), "{z}: {report:?}");
+    }
+}
