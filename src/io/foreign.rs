@@ -275,7 +275,8 @@ fn lies_on(p: &Vec3, x: &[Vec3; 3], reach: f64) -> bool {
     }
     let normal = (x[1] - x[0]).cross(&(x[2] - x[0]));
     let doubled = normal.norm();
-    if !(doubled > 0.0) || (p - x[0]).dot(&normal).abs() > reach * doubled {
+    // Also where it is no number.
+    if doubled.is_nan() || doubled <= 0.0 || (p - x[0]).dot(&normal).abs() > reach * doubled {
         return false;
     }
     // Above each edge, by the same reach.

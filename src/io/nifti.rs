@@ -50,7 +50,7 @@ pub(super) fn read(path: &Path, told: &mut Vec<String>) -> Result<Volume, IoErro
         told.push(format!("{} bytes behind the samples were passed over", data.len() as u64 - wanted));
     }
     let [slope, shift] = match [header.slope, header.shift] {
-        [slope, _] if slope == 0.0 => [1.0, 0.0],
+        [0.0, _] => [1.0, 0.0],
         [slope, shift] if slope.is_finite() && shift.is_finite() => [slope, shift],
         // Some writers say so that there is no scaling.
         [slope, shift] if slope.is_nan() && (shift.is_nan() || shift == 0.0) => [1.0, 0.0],
@@ -332,7 +332,7 @@ fn qform(path: &Path, header: &Header) -> Result<Frame, IoError> {
     let [b, c, d] = header.quaternion;
     let norm = b * b + c * c + d * d;
     // Also where it is no number.
-    if !(norm <= 1.0 + UNIT) {
+    if norm.is_nan() || norm > 1.0 + UNIT {
         let found = format!("{:?}", header.quaternion);
         return Err(IoError::format(
             path,

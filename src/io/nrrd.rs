@@ -12,7 +12,7 @@ use super::IoError;
 use super::ct::{self, Scalar};
 use super::file::read_bytes;
 use super::gzip::gunzip;
-use super::nrrd_files::{Files, Skip};
+use super::nrrd_files::{Files, Skip, Unpack};
 use crate::geometry::Volume;
 use crate::math::Vec3;
 
@@ -88,7 +88,7 @@ pub(super) fn read(path: &Path, told: &mut Vec<String>) -> Result<Volume, IoErro
         Some(text) => Files::named(path, text, attached)?,
     };
     let one = wanted / files.count();
-    let binary = |unpack: &mut dyn FnMut(&Path, &[u8]) -> Result<Vec<u8>, IoError>| {
+    let binary = |unpack: &mut Unpack| {
         let little = header.little(scalar)?;
         Ok::<_, IoError>(scalar.decode(&files.gather(path, wanted, unpack)?, little))
     };
@@ -105,7 +105,10 @@ pub(super) fn read(path: &Path, told: &mut Vec<String>) -> Result<Volume, IoErro
                 let text = String::from_utf8_lossy(skip.text(file, data)?).into_owned();
                 let slip = |w: &str| IoError::format(file, "the samples", format!("`{w}`"), "numbers");
                 let words = text.split(|c: char| c.is_ascii_whitespace() || c == ',').filter(|w| !w.is_empty());
-                words.map(|w| Ok(samples.push(w.parse().map_err(|_| slip(w))?))).collect::<Result<(), IoError>>()
+                for w in words {
+                    samples.push(w.parse().map_err(|_| slip(w))?);
+                }
+                Ok(())
             })?;
             if samples.len() > grid.len() {
                 let found = format!("{} numbers", samples.len());

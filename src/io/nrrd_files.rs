@@ -8,6 +8,11 @@ use super::file::read_bytes;
 /// Files that a header may name.
 const MOST_FILES: usize = 100_000;
 
+/// Takes the bytes of a file.
+type Take<'a> = dyn FnMut(&Path, &[u8]) -> Result<(), IoError> + 'a;
+/// Makes samples' bytes of those of a file.
+pub(super) type Unpack<'a> = dyn FnMut(&Path, &[u8]) -> Result<Vec<u8>, IoError> + 'a;
+
 /// What to leave out at the beginning of each file.
 pub(super) struct Skip {
     /// Lines, before anything is unpacked.
@@ -126,11 +131,7 @@ impl<'a> Files<'a> {
     }
 
     /// Hands each file's bytes on, in order.
-    pub fn each(
-        &self,
-        header: &Path,
-        take: &mut dyn FnMut(&Path, &[u8]) -> Result<(), IoError>,
-    ) -> Result<(), IoError> {
+    pub fn each(&self, header: &Path, take: &mut Take) -> Result<(), IoError> {
         match self {
             Self::Here(data) => take(header, data),
             Self::There(files) => files.iter().try_for_each(|file| take(file, &read_bytes(file)?)),
@@ -138,18 +139,16 @@ impl<'a> Files<'a> {
     }
 
     /// `wanted` bytes in all, the same number from each file as `read` makes it.
-    pub fn gather(
-        &self,
-        header: &Path,
-        wanted: u64,
-        read: &mut dyn FnMut(&Path, &[u8]) -> Result<Vec<u8>, IoError>,
-    ) -> Result<Vec<u8>, IoError> {
+    pub fn gather(&self, header: &Path, wanted: u64, read: &mut Unpack) -> Result<Vec<u8>, IoError> {
         if !wanted.is_multiple_of(self.count()) {
             let found = format!("{} files", self.count());
             return Err(IoError::format(header, "field `data file`", found, "the same number of samples in each file"));
         }
         let mut all = Vec::new();
-        self.each(header, &mut |file, data| Ok(all.append(&mut read(file, data)?)))?;
+        self.each(header, &mut |file, data| {
+            all.append(&mut read(file, data)?);
+            Ok(())
+        })?;
         if all.len() as u64 != wanted {
             return Err(IoError::truncated(header, "the samples", wanted, all.len() as u64));
         }

@@ -374,10 +374,10 @@ pub(super) fn advance(
                     || spent > BUDGET * model.parts().strategy.max_iterations
                 {
                     let is_final = source.is_final();
-                    if !is_final && dt > 0.0 && is_way_from_rest_another(model, state) {
-                        if let Some(again) = redo_from_rest(model, state, work, &report, dt) {
-                            return Ok(again);
-                        }
+                    let may_redo = !is_final && dt > 0.0 && is_way_from_rest_another(model, state);
+                    let again = may_redo.then(|| redo_from_rest(model, state, work, &report, dt)).flatten();
+                    if let Some(again) = again {
+                        return Ok(again);
                     }
                     let cuts = (1.0 / (to - done)).round() as u32;
                     let place = worst_place(model, &work.config.x).map(Box::new);

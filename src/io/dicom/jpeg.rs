@@ -157,7 +157,7 @@ impl Scan<'_> {
         if !(1..=7).contains(&self.predictor) || self.shift >= self.precision {
             return Err(format!("predictor {} and point transform {}", self.predictor, self.shift));
         }
-        if self.restart % columns != 0 {
+        if !self.restart.is_multiple_of(columns) {
             return Err(format!("a restart interval of {} within lines of {columns}", self.restart));
         }
         let lines = self.restart / columns;

@@ -336,7 +336,7 @@ impl VtuFile<'_> {
             "16" => 2,
             _ => 1,
         };
-        if bytes.len() % width != 0 {
+        if !bytes.len().is_multiple_of(width) {
             let found = format!("{} bytes", bytes.len());
             return Err(IoError::format(
                 self.path,
