@@ -42,7 +42,7 @@ def test_a_component_feels_what_the_programme_feels(folder, name, host):
     force = drive(host)
     with open(folder / "ports.csv") as file:
         rows = list(csv.DictReader(file))[1:]
-    wanted = np.array([[float(row[f"contact.force[1,{c}]"]) for c in (1, 2, 3)] for row in rows])
+    wanted = np.array([[float(row[f"contact.force.tip.{c}"]) for c in "xyz"] for row in rows])
     assert np.array_equal(force, wanted)
     assert force[-1, 2] > 1.0 and np.all(np.diff(force[:, 2]) > 0.0)
     assert 0.0 < np.asarray(host.get("contact.depth")).item() < 1e-3

@@ -173,7 +173,7 @@ def test_command_line_has_the_bits_of_fmi3(archive3, tmp_path):
     assert len(rows) > 2
 
     def array(row, name):
-        return np.array([v for k, v in row.items() if k == name or k.startswith(name + "[")])
+        return np.array([v for k, v in row.items() if k == name or k.startswith(name + ".")])
 
     host = Host3(archive3)
     inputs = [v.name for v in archive3.description.modelVariables if v.causality == "input"]
