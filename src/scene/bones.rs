@@ -16,8 +16,13 @@ const NO_NODES: &str = "none";
 const ROUND_OFF: f64 = 1e-9;
 
 impl Builder<'_> {
-    /// Bones and their nodes. With `rings` > 0 a node that two bones claim belongs to neither.
-    pub(super) fn bones(&self, specs: &[BoneSpec], mesh: &TetMesh, rings: u32) -> Result<Vec<Bone>, SceneError> {
+    /// Bones and their nodes, and the nodes that two of them claim: with `rings` > 0 these belong to neither.
+    pub(super) fn bones(
+        &self,
+        specs: &[BoneSpec],
+        mesh: &TetMesh,
+        rings: u32,
+    ) -> Result<(Vec<Bone>, Vec<u32>), SceneError> {
         self.text.names("bone", specs.iter().map(|b| &b.name))?;
         let mut owner: Vec<Option<&str>> = vec![None; mesh.nodes.len()];
         let mut shared = vec![false; mesh.nodes.len()];
@@ -50,7 +55,8 @@ impl Builder<'_> {
             bones.push(Bone { name: spec.name.get_ref().clone(), nodes, drive });
         }
         bones.iter_mut().for_each(|b| b.nodes.retain(|a| !shared[*a as usize]));
-        Ok(bones)
+        let shared = (0..mesh.nodes.len() as u32).filter(|&a| shared[a as usize]).collect();
+        Ok((bones, shared))
     }
 
     /// Says which sets there are.
@@ -171,10 +177,10 @@ pub(super) fn wants_no_nodes(spec: &BoneSpec) -> bool {
 }
 
 /// Takes bone nodes within `rings` edges of another bone off their bone. Edges are counted through tissue and bone alike, from
-/// where the bones were before any was set free.
-pub(super) fn free_rings(mesh: &TetMesh, bones: &mut [Bone], rings: u32, warnings: &mut Vec<String>) {
+/// where the bones were before any was set free; nodes that two bones claim (`shared`) are another bone's to both.
+pub(super) fn free_rings(mesh: &TetMesh, bones: &mut [Bone], shared: &[u32], rings: u32, warnings: &mut Vec<String>) {
     let neighbours = neighbours(mesh);
-    let near = |other: usize| within_edges(&neighbours, bones, other, rings);
+    let near = |own: usize| within_edges(&neighbours, bones, shared, own, rings);
     let near: Vec<Vec<bool>> = (0..bones.len()).map(near).collect();
     let mut freed = 0;
     for (b, bone) in bones.iter_mut().enumerate() {
@@ -193,11 +199,11 @@ pub(super) fn free_rings(mesh: &TetMesh, bones: &mut [Bone], rings: u32, warning
     }
 }
 
-/// Nodes within `rings` edges of any bone but `own`.
-fn within_edges(neighbours: &[Vec<u32>], bones: &[Bone], own: usize, rings: u32) -> Vec<bool> {
+/// Nodes within `rings` edges of any bone but `own`, or of a node that two bones claim.
+fn within_edges(neighbours: &[Vec<u32>], bones: &[Bone], shared: &[u32], own: usize, rings: u32) -> Vec<bool> {
     let mut reached = vec![false; neighbours.len()];
     let others = bones.iter().enumerate().filter(|(b, _)| *b != own);
-    let mut front: Vec<u32> = others.flat_map(|(_, bone)| bone.nodes.iter().copied()).collect();
+    let mut front: Vec<u32> = others.flat_map(|(_, bone)| &bone.nodes).chain(shared).copied().collect();
     front.iter().for_each(|&a| reached[a as usize] = true);
     for _ in 0..rings {
         let mut next = Vec::new();

@@ -121,9 +121,9 @@ impl Builder<'_> {
         let Tissue { mut terms, density, mut n_history, tunable } =
             self.tissue(file, &mesh, &midsides, &mut warnings)?;
         let rings = attachment.as_ref().and_then(|a| a.free_rings.as_ref()).map_or(0, |r| *r.get_ref());
-        let mut bones = self.bones(bone, &mesh, rings)?;
+        let (mut bones, shared) = self.bones(bone, &mesh, rings)?;
         if rings > 0 {
-            free_rings(&mesh, &mut bones, rings, &mut warnings);
+            free_rings(&mesh, &mut bones, &shared, rings, &mut warnings);
         }
         let first_of_contacts = mesh.nodes.len() as u32;
         let mut contacts = Vec::new();
