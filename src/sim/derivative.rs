@@ -125,7 +125,8 @@ impl Sim {
         for &known in knowns {
             let (_, range) = self.known(known)?;
             let (now, later) = left.split_at_checked(range.len()).ok_or_else(|| mismatch("seed", range.len(), left))?;
-            direction[range].copy_from_slice(now);
+            // A known that is named twice moves by both.
+            direction[range].iter_mut().zip(now).for_each(|(d, seed)| *d += seed);
             left = later;
         }
         if !left.is_empty() {

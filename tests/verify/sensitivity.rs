@@ -454,3 +454,23 @@ fn what_has_no_adjoint_says_why() {
     let residual = port(&sim, "solver.residual");
     assert!(ask(&mut sim, residual, &[1.0], known, 3).contains("solver.residual"));
 }
+
+/// A Jacobian times a vector is a sum over the knowns, also where one is named twice.
+#[test]
+fn knowns_named_twice_count_twice() {
+    let scene = "[mesh.block]\nsize = [0.06, 0.04, 0.02]\ncells = [4, 3, 2]\n[[tissue]]\nE = 15e3\nnu = 0.4\n[[bone]]\nname = \"skull\"\n\
+                 nodes = \"x_min\"\n[[bone]]\nname = \"jaw\"\nnodes = \"x_max\"\n";
+    let mut sim = crate::common::sim(scene);
+    sim.initialise().expect("rest");
+    let [known, unknown] = ["bone.translation", "bone.reactionForce"].map(|name| crate::common::port(&sim, name));
+    let seeds = [[0.0, 0.0, 0.0, 1.0, 0.5, 0.0], [0.0, 0.0, 0.0, 0.0, 0.25, -1.0]];
+    let mut along = |knowns: &[usize], seed: &[f64]| {
+        let mut out = [0.0; 6];
+        sim.directional_derivative(knowns, seed, &[unknown], &mut out).expect("a derivative");
+        out
+    };
+    let twice = along(&[known, known], seeds.as_flattened());
+    let sum: Vec<f64> = seeds[0].iter().zip(seeds[1]).map(|(a, b)| a + b).collect();
+    let once = along(&[known], &sum);
+    assert!(once.iter().any(|v| v.abs() > 1.0) && twice == once, "{twice:?}, {once:?}");
+}
