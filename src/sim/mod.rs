@@ -255,10 +255,7 @@ impl Sim {
     /// # Errors
     /// As for [`Sim::step`].
     pub fn initialise(&mut self) -> Result<StepReport, SimError> {
-        let mut state = State::start(&self.model);
-        state.t = self.state.t;
-        state.most_solves = self.state.most_solves;
-        state.inputs.copy_from_slice(&self.state.inputs);
+        let mut state = self.state.at_rest(&self.model);
         self.work.allowance.grant(state.most_solves);
         let report = step::initialise(&self.model, &mut state, &mut self.work)?;
         self.state = state;

@@ -146,6 +146,11 @@ impl State {
         }
     }
 
+    /// Rest, with time, inputs and bound of work as the host set them: where the way to these inputs begins anew.
+    pub(super) fn at_rest(&self, model: &Model) -> State {
+        State { t: self.t, inputs: self.inputs.clone(), most_solves: self.most_solves, ..State::start(model) }
+    }
+
     /// Whether it is a state of this model: of no other mesh, and of no other material on the same mesh.
     ///
     /// # Errors

@@ -375,7 +375,7 @@ pub(super) fn advance(
                 {
                     let is_final = source.is_final();
                     let may_redo = !is_final && dt > 0.0 && is_way_from_rest_another(model, state);
-                    let again = may_redo.then(|| redo_from_rest(model, state, work, &report, dt)).flatten();
+                    let again = if may_redo { redo_from_rest(model, state, work, &report, dt)? } else { None };
                     if let Some(again) = again {
                         return Ok(again);
                     }
@@ -433,17 +433,22 @@ fn is_way_from_rest_another(model: &Model, state: &State) -> bool {
 }
 
 /// The step again from rest along the inputs, told; `None` if that has no answer either.
+///
+/// # Errors
+/// Where the host ends it.
 fn redo_from_rest(
     model: &Arc<Model>,
     state: &mut State,
     work: &mut Workspace,
     so_far: &StepReport,
     dt: f64,
-) -> Option<StepReport> {
-    let mut fresh = State::start(model);
-    (fresh.t, fresh.most_solves) = (state.t, state.most_solves);
-    fresh.inputs.copy_from_slice(&state.inputs);
-    let mut report = advance(model, &mut fresh, work, 0.0, None).ok()?;
+) -> Result<Option<StepReport>, SimError> {
+    let mut fresh = state.at_rest(model);
+    let mut report = match advance(model, &mut fresh, work, 0.0, None) {
+        Ok(report) => report,
+        Err(SimError::Solve { source, .. }) if !source.is_final() => return Ok(None),
+        Err(error) => return Err(error),
+    };
     report.iterations += so_far.iterations;
     report.factorisations += so_far.factorisations;
     fresh.t += dt;
@@ -452,13 +457,12 @@ fn redo_from_rest(
         "no way was found from the last state: the answer is the one that the tissue reaches from rest under these inputs".into(),
     );
     *state = fresh;
-    Some(report)
+    Ok(Some(report))
 }
 
 /// Takes tissue that hangs off rest, `moved` by so much (m) although every input is at rest, back where that is lower.
 fn settle(model: &Arc<Model>, state: &mut State, work: &mut Workspace, report: &mut StepReport, moved: f64) {
-    let mut fresh = State::start(model);
-    (fresh.t, fresh.inputs) = (state.t, state.inputs.clone());
+    let mut fresh = state.at_rest(model);
     let elastic = |state: &State| strain(model, state, &state.config.x).energy;
     let is_lower = match advance(model, &mut fresh, work, 0.0, None) {
         Ok(way) => {
