@@ -2,17 +2,18 @@
 
 use std::path::PathBuf;
 
-use cutis::geometry::{BakeOptions, bake};
+use cutis::geometry::anatomy::Hints;
+use cutis::geometry::{BakeOptions, Warning, bake};
 use cutis::io::{self, LabelMap};
-use cutis::math::Vec3;
 
+use super::bake_file::{BakeFile, Seed, metres, pair};
 use super::progress;
 
 #[derive(clap::Args)]
 pub struct Bake {
     /// CT of a head: NIfTI, NRRD, or a folder with a DICOM series
     volume: PathBuf,
-    /// Labels of the same head: 2 skull, 3 mandible, 4 spine (NIfTI or NRRD)
+    /// Labels of the same head: 2 skull, 3 mandible, 4 spine, 6 hyoid (NIfTI or NRRD); without them the bones are found
     #[arg(short, long)]
     labels: Option<PathBuf>,
     /// Numbers of the labels file that stand for bones, for example skull=5,mandible=1 (a bone may have several)
@@ -21,21 +22,39 @@ pub struct Bake {
     /// Mesh to write: .cutis, .msh, .vtu or .vtk
     #[arg(short, long, default_value = "face.cutis")]
     out: PathBuf,
-    /// Edge of the lattice cell, mm
-    #[arg(long, default_value_t = 4.0, allow_negative_numbers = true)]
-    edge: f64,
-    /// Threshold of the skin, HU
-    #[arg(long, default_value_t = -300.0, allow_negative_numbers = true)]
-    skin: f64,
-    /// Threshold of bone, HU
-    #[arg(long, default_value_t = 250.0, allow_negative_numbers = true)]
-    bone: f64,
+    /// Edge of the lattice cell, mm [default: 4]
+    #[arg(long, allow_negative_numbers = true)]
+    edge: Option<f64>,
+    /// Threshold of the skin, HU [default: -300]
+    #[arg(long, allow_negative_numbers = true)]
+    skin: Option<f64>,
+    /// Threshold of bone, HU [default: 250]
+    #[arg(long, allow_negative_numbers = true)]
+    bone: Option<f64>,
     /// Region of interest, two corners in mm (LPS): x0 y0 z0 x1 y1 z1; found from the nose tip if left out
     #[arg(long, num_args = 6, allow_negative_numbers = true, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"])]
     roi: Option<Vec<f64>>,
     /// Box in which the closed mouth may be cut, two corners in mm (LPS); found from the teeth if left out
     #[arg(long, num_args = 6, allow_negative_numbers = true, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"])]
     mouth: Option<Vec<f64>>,
+    /// Right and left condyle in mm (LPS), where they are not found
+    #[arg(long, num_args = 6, allow_negative_numbers = true, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"])]
+    hinge: Option<Vec<f64>>,
+    /// Plane where the teeth meet, where it is not found: a point in mm (LPS) and the normal
+    #[arg(long, num_args = 6, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "NX", "NY", "NZ"])]
+    occlusal: Option<Vec<f64>>,
+    /// A place of a bone in mm (LPS), where the bones are not told apart: mandible=-22,-82,-80 (several times)
+    #[arg(long, value_name = "BONE=X,Y,Z")]
+    seed: Vec<Seed>,
+    /// Settings of this scan (docs/ct.md); bake.toml beside the scan if left out and there
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Write the labels of the bones, to be mended and given back: .nii, .nii.gz
+    #[arg(long, value_name = "FILE")]
+    write_labels: Option<PathBuf>,
+    /// Refuse bones and a hinge that fail a check
+    #[arg(long)]
+    strict: bool,
     /// Leave the lips closed
     #[arg(long)]
     no_slit: bool,
@@ -45,37 +64,21 @@ impl Bake {
     pub fn run(self) -> super::Done {
         // Before the work, not after it.
         io::check_mesh_target(&self.out)?;
+        self.write_labels.as_deref().map_or(Ok(()), io::check_labels_target)?;
+        let file = BakeFile::of(&self.volume, self.settings.as_deref())?;
         let mut notes = Vec::new();
         let volume = io::read_volume(&self.volume, &mut notes)?;
-        let map = self.labels_map.unwrap_or_default();
-        let labels = self.labels.as_deref().map(|path| io::read_labels(path, &map, &mut notes)).transpose()?;
+        let map = self.labels_map.clone().unwrap_or_default();
+        let labels = self
+            .labels
+            .as_deref()
+            .or(file.labels.as_deref())
+            .map(|path| io::read_labels(path, &map, &mut notes))
+            .transpose()?;
         for note in &notes {
             eprintln!("warning: {note}");
         }
-        for (option, mm) in [("--roi", &self.roi), ("--mouth", &self.mouth)] {
-            if mm.iter().flatten().any(|v| !v.is_finite()) {
-                return Err(format!(
-                    "{option} takes six finite numbers in mm; found {:?}",
-                    mm.as_deref().unwrap_or_default()
-                )
-                .into());
-            }
-        }
-        if !(self.edge.is_finite() && self.edge > 0.0) {
-            return Err(format!("--edge takes a length above 0 in mm; found {} mm", self.edge).into());
-        }
-        let corners = |mm: &Option<Vec<f64>>| {
-            mm.as_ref().map(|c| [Vec3::new(c[0], c[1], c[2]) * 1e-3, Vec3::new(c[3], c[4], c[5]) * 1e-3])
-        };
-        let options = BakeOptions {
-            skin_hu: self.skin,
-            bone_hu: self.bone,
-            roi: corners(&self.roi),
-            edge: 1e-3 * self.edge,
-            slit: !self.no_slit,
-            mouth: corners(&self.mouth),
-            ..BakeOptions::default()
-        };
+        let options = self.options(file)?;
         let bar = progress::stages();
         let baked = bake(&volume, labels.as_ref(), &options, &mut |stage, share| {
             bar.set_message(stage.to_owned());
@@ -104,6 +107,58 @@ impl Bake {
         }
         io::write_mesh(&self.out, &baked.mesh)?;
         say!("wrote {}", self.out.display());
+        if let Some(path) = &self.write_labels {
+            let Some(labels) = &baked.labels else {
+                return Err(format!("{}: no labels were found that could be written", path.display()).into());
+            };
+            io::write_labels(path, labels)?;
+            say!("wrote {}", path.display());
+            if baked.warnings.contains(&Warning::JawNotFound) {
+                eprintln!("warning: {}: these labels are not trusted and were not used", path.display());
+            }
+        }
         Ok(())
+    }
+
+    /// What the command line says, else the file, else what is usual.
+    fn options(&self, file: BakeFile) -> Result<BakeOptions, Box<dyn std::error::Error>> {
+        let usual = BakeOptions::default();
+        let edge = self.edge.or(file.edge).unwrap_or(1e3 * usual.edge);
+        if !(edge.is_finite() && edge > 0.0) {
+            return Err(format!("--edge takes a length above 0 in mm; found {edge} mm").into());
+        }
+        let places = |option: &str, line: &Option<Vec<f64>>, file: Option<[[f64; 3]; 2]>| {
+            let pair = line.as_deref().and_then(pair).or(file);
+            match pair.filter(|p| p.as_flattened().iter().any(|v| !v.is_finite())) {
+                Some(found) => {
+                    Err(format!("{option} takes six finite numbers in mm; found {:?}", found.as_flattened()))
+                }
+                None => Ok(pair.map(|p| p.map(metres))),
+            }
+        };
+        let occlusal = places("--occlusal", &self.occlusal, file.occlusal.map(|o| [o.point, o.normal]))?;
+        if occlusal.is_some_and(|[_, normal]| normal.norm() == 0.0) {
+            return Err("--occlusal takes a point and a normal; the normal is 0".into());
+        }
+        let of_file = file.seeds.into_iter().flat_map(|(bone, at)| at.into_iter().map(move |p| Seed(bone.clone(), p)));
+        let seeds: Vec<_> = of_file.chain(self.seed.iter().cloned()).map(|Seed(bone, p)| (bone, metres(p))).collect();
+        if let Some((bone, _)) = seeds.iter().find(|(_, p)| p.iter().any(|v| !v.is_finite())) {
+            return Err(format!("--seed {bone} takes three finite numbers in mm").into());
+        }
+        Ok(BakeOptions {
+            skin_hu: self.skin.or(file.skin).unwrap_or(usual.skin_hu),
+            bone_hu: self.bone.or(file.bone).unwrap_or(usual.bone_hu),
+            roi: places("--roi", &self.roi, file.region)?,
+            edge: 1e-3 * edge,
+            slit: !self.no_slit,
+            mouth: places("--mouth", &self.mouth, file.mouth)?,
+            hints: Hints {
+                hinge: places("--hinge", &self.hinge, file.hinge)?,
+                occlusal: occlusal.map(|[point, normal]| [point, normal.normalize()]),
+                seeds,
+            },
+            strict: self.strict,
+            ..usual
+        })
     }
 }

@@ -9,6 +9,7 @@ macro_rules! say {
 }
 
 mod bake;
+mod bake_file;
 mod bench;
 mod check;
 mod demo;

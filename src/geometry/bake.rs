@@ -1,12 +1,13 @@
 //! From a head CT to a mesh of the face: region, surfaces, bones, tetrahedra, slit, layers, and what to beware of.
 
+use super::anatomy::{About, Anatomy, Check, Hints, anatomy};
 use super::assemble::{Assembled, Bone, Kind, Naming, assemble};
+use super::bones::{BONES, bone_map};
 use super::clean::{crop, flood, one_body, outer_air, soften_islands, solid_bones};
 use super::distance::{travel, unsigned};
-use super::face::{condyles, empty, mouth, nose_tip, region};
+use super::face::{empty, mouth, nose_tip, region};
 use super::label::{LayerShare, Layers};
 use super::labels::usable;
-use super::separate::{BONES, bone_map};
 use super::stuffing::{Side, Wall};
 use super::warning::{Under, Warning, thin};
 use super::{
@@ -55,6 +56,10 @@ pub struct BakeOptions {
     pub slit: bool,
     /// Box in which the slit may run, corners in LPS metres; without one it is found from the teeth.
     pub mouth: Option<[Vec3; 2]>,
+    /// What is known of the anatomy.
+    pub hints: Hints,
+    /// Whether bones or a hinge that fail a check are refused, not only told.
+    pub strict: bool,
 }
 
 impl Default for BakeOptions {
@@ -70,6 +75,8 @@ impl Default for BakeOptions {
             fat_by_hu: true,
             slit: true,
             mouth: None,
+            hints: Hints::default(),
+            strict: false,
         }
     }
 }
@@ -85,7 +92,12 @@ pub struct Baked {
     pub warnings: Vec<Warning>,
     /// Share of the volume of each layer.
     pub layers: Vec<LayerShare>,
-    /// Heads of the right and the left condyle, LPS, m: the jaw opens about the line through them.
+    /// Labels of the bones: those given, or those found. Found ones whose checks fail were not used.
+    pub labels: Option<Labels>,
+    /// Figures that bones and hinge were judged by.
+    pub checks: Vec<Check>,
+    /// Heads of the right and the left condyle, LPS, m: the jaw opens about the line through them. None where they are not
+    /// in the scan or their checks fail.
     pub condyles: Option<[Vec3; 2]>,
     /// Box in which the lips were parted, corners in LPS metres.
     pub mouth: Option<[Vec3; 2]>,
@@ -118,8 +130,11 @@ pub fn bake(
         Some(labels) => usable(labels, volume, options.bone_hu, &region)?,
         None => Vec::new(),
     };
+    progress("anatomy", 0.02);
+    let found = Found::of(volume, labels, options)?;
+    warnings.extend(found.warnings);
     let mut part = part_of(volume, &region);
-    progress("surfaces", 0.05);
+    progress("surfaces", 0.1);
     one_body(&mut part, options.skin_hu);
     soften_islands(&mut part, options.bone_hu);
     let first = Distance::to_isosurface(&part, options.bone_hu);
@@ -138,7 +153,7 @@ pub fn bake(
     let under = |p: &Vec3| part.grid.sample(&under, p);
     let deep = deep(&part, options, &outer, &to_bone);
     progress("bones", 0.45);
-    let (map, told) = bone_map(&part, options.bone_hu, labels, &nose);
+    let (map, told) = bone_map(&part, options.bone_hu, found.labels.as_ref().filter(|_| found.trusted));
     let bone_surfaces = split_bones(&part, &to_bone.surface, &map);
     let bins: Vec<Nearest> = bone_surfaces.iter().map(|s| Nearest::new(s, 4e-3)).collect();
     let within = |reach: f64| bins.iter().map(move |b| move |p: &Vec3| b.distance(p, reach).map_or(reach, |d| d.0));
@@ -209,9 +224,49 @@ pub fn bake(
     let coarse = |s: &&LayerShare| (s.reached - s.wanted).abs() > 0.1 * s.wanted;
     warnings.extend(layers.iter().filter(coarse).cloned().map(Warning::Layer));
     progress("done", 1.0);
-    let condyles = if told { condyles(&bone_surfaces[1], &nose) } else { None };
     let mouth = mouth.map(|m| [m.lips.low, m.lips.high]);
-    Ok(Baked { mesh, report, warnings, layers, condyles, mouth, slit_nodes, released_nodes })
+    let Found { labels, checks, condyles, .. } = found;
+    Ok(Baked { mesh, report, warnings, layers, labels, checks, condyles, mouth, slit_nodes, released_nodes })
+}
+
+/// What is known of bones and hinge, and what is doubtful in it.
+struct Found {
+    labels: Option<Labels>,
+    /// Whether the labels are to be used.
+    trusted: bool,
+    checks: Vec<Check>,
+    condyles: Option<[Vec3; 2]>,
+    warnings: Vec<Warning>,
+}
+
+impl Found {
+    /// Labels given are kept, whatever the checks say of them; labels found are dropped if one fails.
+    fn of(volume: &Volume, labels: Option<&Labels>, options: &BakeOptions) -> Result<Self, MeshingError> {
+        let found = anatomy(volume, labels, [options.skin_hu, options.bone_hu], &options.hints);
+        let failed = |about| found.iter().flat_map(move |a| a.doubts(about)).cloned();
+        let doubts: Vec<Check> = failed(About::Bones).chain(failed(About::Hinge)).collect();
+        if options.strict && !(found.is_some() && doubts.is_empty()) {
+            return Err(MeshingError::Doubtful { checks: doubts });
+        }
+        let given = labels.is_some();
+        let bones = failed(About::Bones).next().is_none();
+        let hinge = (given || bones) && failed(About::Hinge).next().is_none();
+        let mut warnings: Vec<Warning> = failed(About::Bones).map(|check| Warning::Bones { check, given }).collect();
+        let found_condyles = match &found {
+            Some(Anatomy { condyles: [Some(right), Some(left)], .. }) if hinge => Some([*right, *left]),
+            _ => None,
+        };
+        let condyles = options.hints.hinge.or(found_condyles);
+        if condyles.is_none() && found.is_some() && (given || bones) {
+            warnings.extend(failed(About::Hinge).map(|check| Warning::Hinge { check }));
+        }
+        if bones {
+            warnings.extend(failed(About::Bite).map(|check| Warning::Bite { check }));
+        }
+        let checks = found.as_ref().map_or(Vec::new(), |a| a.checks.clone());
+        let labels = labels.cloned().or(found.map(|a| a.labels));
+        Ok(Self { labels, trusted: given || bones, checks, condyles, warnings })
+    }
 }
 
 /// The samples of a volume in and round a region.
@@ -243,7 +298,7 @@ fn deep(part: &Volume, options: &BakeOptions, outer: &[bool], to_bone: &Distance
 }
 
 /// The triangles of each bone, by the bone of the nearest bone sample.
-fn split_bones(part: &Volume, surface: &Surface, map: &[u8]) -> [Surface; 3] {
+fn split_bones(part: &Volume, surface: &Surface, map: &[u8]) -> [Surface; BONES.len()] {
     let grid = &part.grid;
     let bone_at = |t: usize| {
         let corners = surface.corners(t);
@@ -258,7 +313,7 @@ fn split_bones(part: &Volume, surface: &Surface, map: &[u8]) -> [Surface; 3] {
         let nearest = around.filter(|&at| map[at] != 0).min_by(|&p, &q| distance(p).total_cmp(&distance(q)));
         nearest.map_or(0, |at| usize::from(map[at]) - 1)
     };
-    let mut parts: [Surface; 3] = std::array::from_fn(|_| Surface::default());
+    let mut parts: [Surface; BONES.len()] = std::array::from_fn(|_| Surface::default());
     for t in 0..surface.triangles.len() {
         parts[bone_at(t)].triangles.push(surface.triangles[t]);
     }

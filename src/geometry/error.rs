@@ -1,5 +1,6 @@
 //! Why a shape could not be meshed.
 
+use super::anatomy::Check;
 use crate::mesh::MeshError;
 
 /// Why a mesh was not made. Nothing was changed.
@@ -87,14 +88,27 @@ pub enum MeshingError {
     },
     /// Labels without any bone.
     #[error(
-        "the labels hold the numbers {found} and no bone; wanted 2 (skull), 3 (mandible) and 4 (spine): say what stands \
+        "the labels hold the numbers {found} and no bone; wanted 2 (skull), 3 (mandible), 4 (spine) and 6 (hyoid): say what stands \
          for them, for example `--labels-map skull=5,mandible=1`"
     )]
     LabelNumbers {
         /// Numbers found, as a list.
         found: String,
     },
+    /// Bones or a hinge that fail a check, where that is not allowed.
+    #[error("the anatomy of the head is doubtful: {}; give --labels, or help with --seed, --hinge and --occlusal", doubts(.checks))]
+    Doubtful {
+        /// The checks that fail; none where nothing looks like a mandible.
+        checks: Vec<Check>,
+    },
     /// The finished mesh broke a rule every mesh keeps.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+}
+
+fn doubts(checks: &[Check]) -> String {
+    match checks {
+        [] => "nothing in the scan looks like a mandible".into(),
+        checks => checks.iter().map(Check::to_string).collect::<Vec<_>>().join("; "),
+    }
 }

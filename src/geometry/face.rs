@@ -10,8 +10,6 @@ const FACE: [[f64; 3]; 2] = [[-0.086, -0.006, -0.096], [0.086, 0.122, 0.082]];
 const LAYER: f64 = 0.5;
 /// What places are rounded to, m.
 const NANOMETRE: f64 = 1e-9;
-/// Height of a condyle's head, m.
-const CONDYLE: f64 = 0.005;
 /// Half width and half height of the mouth, and how far behind the front of the teeth the slit may reach, m.
 const MOUTH: [f64; 3] = [0.025, 0.018, 0.010];
 /// How far the rows of teeth reach beyond the mouth's box to the sides and to the back, and half the height of both
@@ -65,20 +63,6 @@ pub(super) fn region(volume: &Volume, options: &BakeOptions, nose: &Vec3) -> Res
     Ok(region)
 }
 
-/// The heads of the mandible's back third on both sides of the nose's plane: the middle of what is highest.
-pub(super) fn condyles(mandible: &Surface, nose: &Vec3) -> Option<[Vec3; 2]> {
-    let y = mandible.vertices.iter().map(|p| p.y);
-    let (front, back) = (y.clone().fold(f64::INFINITY, f64::min), y.fold(f64::NEG_INFINITY, f64::max));
-    let behind = front + (back - front) * 2.0 / 3.0;
-    let top = |left: bool| {
-        let side = || mandible.vertices.iter().filter(move |p| (p.x > nose.x) == left && p.y > behind);
-        let height = side().map(|p| p.z).max_by(f64::total_cmp)?;
-        let head: Vec<&Vec3> = side().filter(|p| p.z > height - CONDYLE).collect();
-        Some(head.iter().copied().sum::<Vec3>() / head.len() as f64)
-    };
-    Some([top(false)?, top(true)?])
-}
-
 /// Where the jaws part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Mouth {
@@ -108,7 +92,7 @@ impl Mouth {
 }
 
 /// The mouth: its box given, or about the front teeth, where skull and mandible come nearest near the median plane.
-pub(super) fn mouth(options: &BakeOptions, bones: &[Surface; 3], nose: &Vec3, told: bool) -> Option<Mouth> {
+pub(super) fn mouth(options: &BakeOptions, bones: &[Surface], nose: &Vec3, told: bool) -> Option<Mouth> {
     if !options.slit || !told {
         return None;
     }

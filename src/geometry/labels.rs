@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::separate::{BONES, LABELS};
+use super::bones::{BONES, LABELS};
 use super::warning::Warning;
 use super::{Cuboid, Labels, MeshingError, Volume};
 

@@ -4,9 +4,11 @@
 //! same bits. Lengths are metres; only CT samples are Hounsfield units.
 #![forbid(unsafe_code)]
 
+pub mod anatomy;
 mod assemble;
 mod bake;
 mod block;
+mod bones;
 mod clean;
 mod distance;
 mod error;
@@ -20,7 +22,6 @@ mod marching_cubes;
 mod nearest;
 mod quality;
 mod repair;
-mod separate;
 mod shapes;
 mod sizing;
 mod stencils;

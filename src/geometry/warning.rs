@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use super::anatomy::Check;
 use super::label::LayerShare;
 use super::{Cuboid, Distance, Field, Nearest, Surface, doubled_area};
 use crate::math::Vec3;
@@ -36,6 +37,23 @@ pub enum Warning {
     },
     /// Skull and mandible hang together: the jaw cannot move.
     JawNotFound,
+    /// A figure of the bones that none of a head's can have.
+    Bones {
+        /// What fails.
+        check: Check,
+        /// Whether the bones are those of labels that were given.
+        given: bool,
+    },
+    /// The bite is not seen.
+    Bite {
+        /// What fails.
+        check: Check,
+    },
+    /// A figure of the jaw's hinge that none of a head's can have.
+    Hinge {
+        /// What fails.
+        check: Check,
+    },
     /// No slit was cut.
     NoSlit,
     /// Loose pieces that were left out.
@@ -82,8 +100,22 @@ impl fmt::Display for Warning {
                 )
             }
             Self::MoreThin { places, area } => write!(f, "thin tissue at {places} more places, {:.1} cm2", area * 1e4),
-            Self::JawNotFound => {
-                write!(f, "skull and mandible could not be told apart: all bone is `skull`; give a labels file")
+            Self::JawNotFound => write!(
+                f,
+                "skull and mandible could not be told apart: all bone is `skull`, the jaw cannot move; give --labels, or \
+                 show places of the bones with --seed, the line through the condyles with --hinge, the bite with --occlusal"
+            ),
+            Self::Bones { check, given: false } => {
+                write!(f, "the bones that were found are not to be trusted: {check}")
+            }
+            Self::Bones { check, given: true } => write!(f, "do the labels fit this head? {check}"),
+            Self::Bite { check } => write!(
+                f,
+                "where the teeth meet is not seen: {check}; their crowns may belong to the wrong jaw: look at them, or give \
+                 --occlusal"
+            ),
+            Self::Hinge { check } => {
+                write!(f, "the hinge of the jaw is not told: {check}; give the two condyles with --hinge")
             }
             Self::NoSlit => write!(
                 f,

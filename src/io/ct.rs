@@ -54,7 +54,7 @@ fn by_kind(path: &Path, told: &mut Vec<String>) -> Result<Volume, IoError> {
     }
 }
 
-/// Reads tissue numbers from a NIfTI or NRRD file: 2 skull, 3 mandible, 4 spine, or what `map` makes such.
+/// Reads tissue numbers from a NIfTI or NRRD file: 2 skull, 3 mandible, 4 spine, 6 hyoid, or what `map` makes such.
 ///
 /// # Errors
 /// As [`read_volume`]; [`IoError::Format`] where a number is not a whole one in 0..255 or one of `map` is not there.

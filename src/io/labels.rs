@@ -8,7 +8,7 @@ use super::IoError;
 use crate::geometry::{Grid, Labels};
 
 /// Bones that labels tell apart, and their numbers in [`Labels`].
-const BONES: [(&str, u8); 3] = [("skull", 2), ("mandible", 3), ("spine", 4)];
+const BONES: [(&str, u8); 4] = [("skull", 2), ("mandible", 3), ("spine", 4), ("hyoid", 6)];
 /// Numbers that are listed before the rest is only counted.
 const LISTED: usize = 20;
 
@@ -49,7 +49,7 @@ impl LabelMap {
         let whole = |s: &f32| s.fract() == 0.0 && (0.0..=most).contains(s);
         if let Some(k) = samples.iter().position(|s| !whole(s)) {
             let wanted = if self.0.is_empty() {
-                "label numbers 0..255 (2 skull, 3 mandible, 4 spine; other numbers with `--labels-map`)"
+                "label numbers 0..255 (2 skull, 3 mandible, 4 spine, 6 hyoid; other numbers with `--labels-map`)"
             } else {
                 "whole label numbers"
             };

@@ -83,15 +83,19 @@ fn alike(found: &Baked, wanted: &Baked, what: &str) {
     assert!(a.node_sets == b.node_sets && a.face_sets == b.face_sets, "{what}");
     let apart = a.nodes.iter().zip(&b.nodes).map(|(x, y)| (x - y).norm()).fold(0.0, f64::max);
     assert!(apart < 1e-9, "{what}: {apart} m apart");
-    let [c, d] = [found, wanted].map(|b| b.condyles.unwrap());
-    assert!((c[0] - d[0]).norm() + (c[1] - d[1]).norm() < 1e-9, "{what}: {c:?} {d:?}");
+    assert_eq!(found.labels.as_ref().map(|l| &l.ids), wanted.labels.as_ref().map(|l| &l.ids), "{what}");
+    for (c, d) in found.condyles.iter().flatten().zip(wanted.condyles.iter().flatten()) {
+        assert!((c - d).norm() < 1e-9, "{what}: {c:?} {d:?}");
+    }
 }
 
 #[test]
 fn region_and_face_are_the_same_however_voxels_are_stored() {
     let scan = scan();
     let wanted = baked(&read_volume(&write(&scan, "stored.nrrd", false), &mut Vec::new()).unwrap(), None);
-    assert!(wanted.mesh.node_set("mandible").is_some_and(|s| s.nodes.len() > 20));
+    // Its jaw is a sketch, a solid arch: that is told, and nothing is moved that is no jaw.
+    assert!(wanted.warnings.contains(&Warning::JawNotFound) && wanted.condyles.is_none());
+    assert!(wanted.mesh.node_set("mandible").is_none());
     let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     for (k, order) in orders.into_iter().enumerate() {
         for turned in [[k % 2 == 0, k % 3 != 1, k > 2], [true, false, true]] {
