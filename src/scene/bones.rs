@@ -8,7 +8,7 @@ use super::file::BoneSpec;
 use crate::math::Vec3;
 use crate::mesh::TetMesh;
 use crate::port::Slot;
-use crate::sim::{Bone, Drive, Layout};
+use crate::sim::{Bone, Drive, Layout, spans_a_plane};
 
 /// Says that no tissue sticks to a bone: it carries the shape of a contact only.
 const NO_NODES: &str = "none";
@@ -57,6 +57,24 @@ impl Builder<'_> {
         bones.iter_mut().for_each(|b| b.nodes.retain(|a| !shared[*a as usize]));
         let shared = (0..mesh.nodes.len() as u32).filter(|&a| shared[a as usize]).collect();
         Ok((bones, shared))
+    }
+
+    /// A bone that a force drives has to be kept from turning by its nodes.
+    pub(super) fn can_be_pushed(&self, specs: &[BoneSpec], bones: &[Bone], mesh: &TetMesh) -> Result<(), SceneError> {
+        for (spec, bone) in specs.iter().zip(bones).filter(|(_, bone)| bone.drive == Drive::Force) {
+            let X: Vec<Vec3> = bone.nodes.iter().map(|&a| mesh.nodes[a as usize]).collect();
+            if !X.is_empty() && !spans_a_plane(&X) {
+                let message = format!(
+                    "bone `{}` is {} but its {} node(s) lie in a line: nothing holds its turn about that line, and its inertia tensor \
+                     is singular; a bone that a force drives wants at least 3 nodes that are not in a line",
+                    bone.name,
+                    bone.drive,
+                    X.len()
+                );
+                return Err(self.text.at(spec.name.span().start, message));
+            }
+        }
+        Ok(())
     }
 
     /// Says which sets there are.

@@ -22,12 +22,6 @@ const MEMORY: usize = 8;
 const REFRESH_AFTER: u32 = 20;
 /// Largest nodal motion of the last correction, m.
 const TOLERANCE: f64 = 1e-7;
-/// Most linear solves of a step that the scene sets no bound to, in units of `max_iterations`; where pieces of a step keep an
-/// accuracy, of each of them, of which there may be so many.
-const SOLVES: u32 = 5;
-const MOST_PIECES: u32 = 256;
-/// Spectral radius up to which generalised-alpha damps enough for laws that are not linear: no swing tried gained energy.
-const MOST_RHO: f64 = 0.8;
 /// Round-off of the solver that the estimate of an error in time can bear, in units of its accuracy.
 const NOISE: f64 = 0.1;
 
@@ -125,6 +119,7 @@ impl Builder<'_> {
         if rings > 0 {
             free_rings(&mesh, &mut bones, &shared, rings, &mut warnings);
         }
+        self.can_be_pushed(bone, &bones, &mesh)?;
         let first_of_contacts = mesh.nodes.len() as u32;
         let mut contacts = Vec::new();
         for (name, bone, contact) in self.contacts(file, &mut mesh, &mut bones, &mut n_history, &mut warnings)? {
@@ -178,13 +173,8 @@ impl Builder<'_> {
             Some(spec) => {
                 terms.push(Box::new(Inertia { m: masses() }));
                 let scheme = self.scheme(spec)?;
-                if matches!(scheme, Scheme::GeneralisedAlpha { rho } if rho > MOST_RHO)
-                    && terms.iter().any(|t| !t.is_quadratic())
-                {
-                    warnings.push(format!(
-                        "{scheme:?} damps almost nothing that the steps do not resolve: under a law that is not linear such motions \
-                         may gain energy without bound; take rho up to {MOST_RHO}, or bdf2"
-                    ));
+                if terms.iter().any(|t| !t.is_quadratic()) {
+                    warnings.extend(sim::undamped(scheme));
                 }
                 let start = self.text.choice("inertia", "start", &spec.start)?.unwrap_or("equilibrium");
                 let reduction = self.reduction(spec, file, &mesh, &bones, &terms, n_history)?;
@@ -222,7 +212,7 @@ impl Builder<'_> {
         let max_iterations = max_iterations.unwrap_or(200);
         let most_solves = spec.and_then(|s| s.most_solves.as_ref());
         let most_solves = most_solves.map(|n| self.text.count("solver", "most_solves", n)).transpose()?;
-        let pieces = if inertia.as_ref().is_some_and(|i| i.accuracy.is_some()) { MOST_PIECES } else { 1 };
+        let usual_solves = sim::usual_solves(inertia.as_ref(), max_iterations);
         let threads = spec.and_then(|s| s.threads.as_ref());
         let threads = threads.map(|n| self.text.count("solver", "threads", n)).transpose()?.unwrap_or(1);
         let inversion = spec.map(|s| self.text.choice("solver", "inversion", &s.inversion)).transpose()?.flatten();
@@ -272,7 +262,7 @@ impl Builder<'_> {
             start,
             may_invert: inversion == Some("allow"),
             strategy,
-            most_solves: most_solves.unwrap_or((pieces * SOLVES).saturating_mul(max_iterations)),
+            most_solves: most_solves.unwrap_or(usual_solves),
             background,
             identity: identity(self.text.0)?,
             warnings,

@@ -8,6 +8,10 @@ use crate::mesh::signed_volume;
 
 /// A det F at and below which a step tells, and again each time that it has halved.
 const SQUEEZED: f64 = 0.1;
+/// A bound of |F - 1| up to which no det F can be below 0.1, with some room for elements that are not linear.
+const SMALL_STRAIN: f64 = 0.4;
+/// Growth of that bound after which the elements of a table are looked at again.
+const LOOK_AGAIN: f64 = 2.0;
 /// Share of the elastic energy whose loss nothing explains that is a snap.
 const SNAP: f64 = 0.5;
 /// Motion of a snap in sizes of the tissue; less may be round-off that settles.
@@ -91,6 +95,38 @@ pub(super) fn warn_of_squeezing(model: &Model, before: f64, after: f64, x: &[Vec
         true => format!("elements are turned inside out (smallest det F {after:.3}){place}"),
         false => format!("an element is squeezed to {after:.3} of its volume{place}"),
     });
+}
+
+/// When the elements of a table were looked at last: to look at all of them costs many of its steps.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look {
+    /// The bound of |F - 1| then, and the smallest det F found.
+    bound: f64,
+    least: f64,
+}
+
+impl Look {
+    /// Not yet.
+    pub fn none() -> Look {
+        Look { bound: 0.0, least: 1.0 }
+    }
+
+    /// Whether elements may be squeezed more than they were where |F - 1| is `bound` at most.
+    pub fn is_due(&self, bound: f64) -> bool {
+        bound > SMALL_STRAIN.max(LOOK_AGAIN * self.bound)
+    }
+
+    /// Tells what is to be seen at `x`.
+    pub fn take(&mut self, model: &Model, bound: f64, x: &[Vec3], warnings: &mut Vec<String>) {
+        let least = min_det_f(model, x);
+        warn_of_squeezing(model, self.least, least, x, warnings);
+        *self = Look { bound, least: least.min(self.least) };
+    }
+}
+
+/// Smallest det F of all elements at `x`.
+pub(super) fn min_det_f(model: &Model, x: &[Vec3]) -> f64 {
+    model.parts().terms.iter().map(|t| t.min_det_f(x)).fold(f64::INFINITY, f64::min)
 }
 
 /// The balance of a piece of load under bones that move: what they spend must be found in the tissue.

@@ -113,7 +113,7 @@ pub(super) fn causes(model: &Model) -> Option<Vec<Cause>> {
 
 /// What the columns are solved with.
 pub(super) struct Builder<'a> {
-    model: &'a Model,
+    pub(super) model: &'a Model,
     pub(super) minimiser: &'a mut Minimiser,
     made_for: Vec<f64>,
     is_cause: Vec<bool>,
@@ -420,7 +420,7 @@ impl Reaction {
 }
 
 /// Inverses of the edges at rest of each tetrahedron's corners.
-fn rest_inverses(mesh: &TetMesh) -> Vec<Mat3> {
+pub(super) fn rest_inverses(mesh: &TetMesh) -> Vec<Mat3> {
     mesh.tets.iter().map(|tet| edges(tet, &mesh.nodes).try_inverse().unwrap_or_else(Mat3::zeros)).collect()
 }
 
@@ -430,7 +430,7 @@ fn edges(tet: &[u32; 4], x: &[Vec3]) -> Mat3 {
 }
 
 /// Largest norm of the displacement gradient of the tetrahedra's corners from `from` to `to`.
-fn largest_strain(mesh: &TetMesh, inverse: &[Mat3], to: &[Vec3], from: &[Vec3]) -> f64 {
+pub(super) fn largest_strain(mesh: &TetMesh, inverse: &[Mat3], to: &[Vec3], from: &[Vec3]) -> f64 {
     let of = |(tet, inverse): (&[u32; 4], &Mat3)| ((edges(tet, to) - edges(tet, from)) * inverse).norm();
     mesh.tets.iter().zip(inverse).map(of).fold(0.0, f64::max)
 }

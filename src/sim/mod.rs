@@ -25,11 +25,13 @@ mod skin;
 mod start;
 mod state;
 mod step;
+mod swing;
 
 pub use access::View;
 pub use audit::{Place, worst_tets};
 pub use model::{
     Bone, Contact, Drive, Inertia, Marker, Model, ModelParts, Reduction, StandIn, Unconstrained, osteotomy_edges,
+    spans_a_plane, usual_solves,
 };
 pub use modes::Spectrum;
 pub use ports::Layout;
@@ -38,6 +40,7 @@ pub use scheme::Scheme;
 pub use skin::Skin;
 pub use state::{State, StateError};
 pub use step::StepReport;
+pub(crate) use swing::undamped;
 
 use std::sync::{Arc, OnceLock};
 
@@ -68,6 +71,8 @@ pub enum SimError {
         cuts: u32,
         /// Linear solves spent.
         spent: u32,
+        /// All work in linear solves, forces and factors counted by what they take of one.
+        work: f64,
         /// Share of the step that had an answer.
         reached: f64,
         /// The worst element where the solver gave up; `None` where that tells nothing.
@@ -374,6 +379,7 @@ impl Sim {
         self.state.outputs.least = State::UNSEEN;
         self.state.motion.memory.fill([crate::math::Vec3::zeros(); 2]);
         self.state.motion.dt = 0.0;
+        self.state.motion.free = None;
         self.work.kept.origin = Origin::Unknown;
         Ok(())
     }
@@ -410,6 +416,11 @@ impl Sim {
     /// state left out.
     pub fn memory(&self) -> usize {
         self.work.minimiser().memory() * if self.model.parts().background { 2 } else { 1 }
+    }
+
+    /// What a good step takes, in linear solves: some of them, and a factor.
+    pub fn good_step(&self) -> f64 {
+        self.work.minimiser().good_step()
     }
 
     /// Stored entries of the stiffness matrix's factor (8 bytes each).

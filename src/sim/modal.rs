@@ -271,14 +271,27 @@ pub(super) fn advance(
     let mut scratch = std::mem::take(&mut modal.scratch);
     modal.coefficients(1.0, &modal.next.q, &modal.next.p, &mut scratch, &mut coefficients);
     (modal.map.q, modal.scratch) = (coefficients, scratch);
-    let [residual, correction, _] = modal.map.bounds();
+    let [residual, correction, strain_bound] = modal.map.bounds();
     let tolerance = model.parts().strategy.tolerance;
     if !(residual.is_finite() && correction <= tolerance) {
         let source = match residual.is_finite() && correction.is_finite() {
             true => SolveError::NotConverged { iterations: 0, correction, tolerance, residual },
             false => SolveError::NotFinite,
         };
-        return Err(SimError::Solve { t: state.t, dt, cuts: 1, spent: 0, reached: 0.0, place: None, source });
+        return Err(SimError::Solve {
+            t: state.t,
+            dt,
+            cuts: 1,
+            spent: 0,
+            work: 0.0,
+            reached: 0.0,
+            place: None,
+            source,
+        });
+    }
+    if modal.look.is_due(strain_bound) {
+        modal.map.place_whole(model, &state.inputs, &modal.pivots, &mut modal.config);
+        modal.look.take(model, strain_bound, &modal.config.x, &mut report.warnings);
     }
     let before = worst_jump(model, &state.config.x);
     modal.last.from.copy_from(from);

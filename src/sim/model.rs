@@ -179,6 +179,17 @@ pub struct ModelParts {
     pub warnings: Vec<String>,
 }
 
+/// Linear solves of a step that nobody sets a bound to, in units of `max_iterations`; where pieces of a step keep an accuracy, of
+/// each of them, of which there may be so many.
+const SOLVES: u32 = 5;
+const MOST_PIECES: u32 = 256;
+
+/// Most linear solves of a step that nobody sets another bound to.
+pub fn usual_solves(inertia: Option<&Inertia>, max_iterations: u32) -> u32 {
+    let pieces = if inertia.is_some_and(|i| i.accuracy.is_some()) { MOST_PIECES } else { 1 };
+    (pieces * SOLVES).saturating_mul(max_iterations)
+}
+
 /// Tissue that nothing holds.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
@@ -418,7 +429,8 @@ fn check_held(parts: &ModelParts, dofs: &Dofs) -> Result<(), Unconstrained> {
     }
     // Nodes that move the shape of a contact are held one by one.
     let all_held = |root: &u32, nodes: usize| held.get(root).is_some_and(|held| held.len() == nodes);
-    let is_loose = |root: &u32, nodes: usize| !all_held(root, nodes) && !spans_a_plane(held.get(root));
+    let is_loose =
+        |root: &u32, nodes: usize| !all_held(root, nodes) && !held.get(root).is_some_and(|held| spans_a_plane(held));
     let loose: Vec<_> = size.iter().filter(|(root, (nodes, _))| is_loose(root, *nodes)).collect();
     let Some((root, (nodes, sum))) = loose.iter().max_by_key(|(_, (nodes, _))| *nodes) else {
         return Ok(());
@@ -428,8 +440,11 @@ fn check_held(parts: &ModelParts, dofs: &Dofs) -> Result<(), Unconstrained> {
     Err(Unconstrained { count: loose.len(), nodes: *nodes, held, x: c.x, y: c.y, z: c.z })
 }
 
-fn spans_a_plane(points: Option<&Vec<Vec3>>) -> bool {
-    let Some(points) = points else { return false };
+/// Whether points hold a body: they lie neither in a line nor in one place.
+pub fn spans_a_plane(points: &[Vec3]) -> bool {
+    if points.is_empty() {
+        return false;
+    }
     let c = points.iter().sum::<Vec3>() / points.len() as f64;
     let spread: Mat3 = points.iter().map(|p| (p - c) * (p - c).transpose()).sum();
     let s = svd(&spread).s;

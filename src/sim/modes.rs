@@ -10,7 +10,8 @@
 use nalgebra::DMatrix;
 
 use super::SimError;
-use super::linear_map::{Builder, Cause, Column, LinearMap, Reaction, causes};
+use super::audit::Look;
+use super::linear_map::{Builder, Cause, Column, LinearMap, Reaction, causes, largest_strain, rest_inverses};
 use super::modal::{Coordinates, Last};
 use super::model::{Drive, Model};
 use super::scheme::Scheme;
@@ -85,6 +86,8 @@ pub(super) struct Modal {
     /// Inertial force of the nodes of each bone as a function of the causes' accelerations.
     pub(super) inertial: Vec<Reaction>,
     pub(super) spectrum: Spectrum,
+    /// When the elements were looked at.
+    pub(super) look: Look,
     /// Whether it was said that steps resolve more than the modes hold.
     pub(super) told: bool,
     pub(super) next: Coordinates,
@@ -176,6 +179,7 @@ impl Modal {
             elastic,
             inertial,
             spectrum: Spectrum::new(&found, n_modes, &m),
+            look: Look::none(),
             told: false,
             next: Coordinates::still(model),
             last: Last::none(model),
@@ -184,7 +188,7 @@ impl Modal {
             w: vec![0.0; causes.len() + n_modes],
             scratch: zero(),
             accelerations: vec![0.0; causes.len()],
-            config: Configuration { x: Vec::new(), poses: vec![Pose::REST; parts.bones.len()] },
+            config: Configuration { x: parts.mesh.nodes.clone(), poses: vec![Pose::REST; parts.bones.len()] },
             map: builder.tabulate(causes.clone(), &columns),
             causes,
             pivots,
@@ -299,14 +303,16 @@ fn elastic(model: &Model, builder: &mut Builder, causes: &[Cause], columns: &[Co
 fn shapes(builder: &mut Builder, phi: &[Vec<Vec3>], lambda: &[f64], m: &[f64]) -> Vec<Column> {
     builder.gradient();
     let (rest, nodal, g) = (builder.config.clone(), builder.nodal.clone(), builder.g.clone());
+    let inverse = rest_inverses(builder.model.mesh());
     let mut of = |(phi, lambda): (&Vec<Vec3>, &f64)| {
         builder.move_free(phi);
         builder.gradient();
+        let strain = largest_strain(builder.model.mesh(), &inverse, &builder.config.x, &rest.x);
         builder.config.copy_from(&rest);
         let left = builder.g.iter().zip(&g).zip(phi).zip(m).map(|(((g, rest), phi), m)| g - rest - *lambda * *m * phi);
         let residual = left.map(|r| r.norm_squared()).sum::<f64>().sqrt();
         let correction = REMAINDER * phi.iter().map(Vec3::norm).fold(0.0, f64::max);
-        Column { d: phi.clone(), nodal: difference(&builder.nodal, &nodal), residual, correction, strain: 0.0 }
+        Column { d: phi.clone(), nodal: difference(&builder.nodal, &nodal), residual, correction, strain }
     };
     phi.iter().zip(lambda).map(&mut of).collect()
 }

@@ -2,6 +2,7 @@
 
 use super::model::Inertia;
 use super::scheme::{Formula, Past};
+use super::swing::Free;
 use crate::fem::{Configuration, Dofs, Role};
 use crate::math::Vec3;
 
@@ -18,6 +19,8 @@ pub(super) struct Motion {
     pub dt: f64,
     /// Length that the next piece should have, s; 0 while nobody asked.
     pub next_dt: f64,
+    /// What the motion may have while no input changes; `None` where nobody looks.
+    pub free: Option<Free>,
 }
 
 impl Motion {
@@ -31,6 +34,7 @@ impl Motion {
             memory: vec![[Vec3::zeros(); 2]; if remembers { n_nodes } else { 0 }],
             dt: 0.0,
             next_dt: 0.0,
+            free: None,
         }
     }
 
@@ -39,7 +43,7 @@ impl Motion {
         self.v.copy_from_slice(&other.v);
         self.a.copy_from_slice(&other.a);
         self.memory.copy_from_slice(&other.memory);
-        (self.dt, self.next_dt) = (other.dt, other.next_dt);
+        (self.dt, self.next_dt, self.free) = (other.dt, other.next_dt, other.free);
     }
 
     /// Forgets all motion.
@@ -47,7 +51,7 @@ impl Motion {
         self.v.fill(Vec3::zeros());
         self.a.fill(Vec3::zeros());
         self.memory.fill([Vec3::zeros(); 2]);
-        (self.dt, self.next_dt) = (0.0, 0.0);
+        (self.dt, self.next_dt, self.free) = (0.0, 0.0, None);
     }
 
     /// Where inertia alone carries the nodes of `x` (m); those of bones are on their way by `u`.
@@ -84,7 +88,7 @@ impl Motion {
         self.dt = dt;
     }
 
-    fn past(&self, a: usize, x: &[Vec3]) -> Past {
+    pub fn past(&self, a: usize, x: &[Vec3]) -> Past {
         let memory = self.memory.get(a).copied().unwrap_or([Vec3::zeros(); 2]);
         Past { x: x[a], v: self.v[a], memory }
     }

@@ -42,6 +42,9 @@ const ALPHA_GROWTH: f64 = 1.2;
 /// Ratio by which steps of the other schemes grow where they are chosen here: `fem::Difference` bears more.
 const GROWTH: f64 = 1.4;
 
+/// Ratio of a step to the one before from which on every scheme starts anew.
+const MOST_GROWTH: f64 = 1e6;
+
 /// Part of a ratio that its own round-off may be.
 const ROUND_OFF: f64 = 1e-9;
 
@@ -130,7 +133,9 @@ impl Scheme {
             let rate = difference.rate;
             return Formula { dt, dt_before, rate, inertia: rate * rate, kind: Kind::Difference(difference) };
         };
-        if rho < 1.0 && dt_before > 0.0 && dt > self.growth() * (1.0 + ROUND_OFF) * dt_before {
+        // rho = 1 remembers nothing that a step could be too long for, and starts anew only where it is told to.
+        let most = if rho < 1.0 { self.growth() } else { MOST_GROWTH };
+        if dt_before > 0.0 && dt > most * (1.0 + ROUND_OFF) * dt_before {
             let difference = Difference::new(dt, 0.0);
             let rate = difference.rate;
             return Formula { dt, dt_before, rate, inertia: rate * rate, kind: Kind::Restart(difference) };

@@ -9,6 +9,7 @@ use super::modal::Coordinates;
 use super::model::Model;
 use super::motion::Motion;
 use super::past::Before;
+use super::swing::Free;
 use crate::bytes::{Reader, Truncated, Writer};
 use crate::fem::Configuration;
 use crate::math::{Mat3, Pose, Vec3};
@@ -109,7 +110,7 @@ pub enum StateError {
 }
 
 const MAGIC: &[u8; 8] = b"cutis-st";
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 
 impl State {
     /// A det F that says nothing.
@@ -190,6 +191,10 @@ impl State {
         put_vectors(&mut body, self.motion.memory.as_flattened());
         body.f64(self.motion.dt);
         body.f64(self.motion.next_dt);
+        body.u32(u32::from(self.motion.free.is_some()));
+        if let Some(Free { most, swing }) = self.motion.free {
+            body.f64s([most, swing].into_iter());
+        }
         if model.is_reduced() {
             put_coordinates(&mut body, &self.modal);
         }
@@ -370,7 +375,12 @@ fn take_motion(r: &mut Reader, like: &Motion) -> Result<Motion, StateError> {
     let a = take_vectors(r, "accelerations", like.a.len())?;
     let memory = take_vectors(r, "remembered motions", 2 * like.memory.len())?;
     let memory = memory.chunks_exact(2).map(|m| [m[0], m[1]]).collect();
-    Ok(Motion { v, a, memory, dt: r.f64()?, next_dt: r.f64()? })
+    let (dt, next_dt) = (r.f64()?, r.f64()?);
+    let free = match r.u32()? {
+        0 => None,
+        _ => Some(Free { most: r.f64()?, swing: r.f64()? }),
+    };
+    Ok(Motion { v, a, memory, dt, next_dt, free })
 }
 
 /// Those of scenes in modes; other scenes write none.

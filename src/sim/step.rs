@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use super::ahead::Ahead;
 use super::approach::{Approach, check_depth};
-use super::audit::{Balance, hangs, is_same_place, snapped, warn_of_squeezing, worst_place};
+use super::audit::{Balance, Look, hangs, is_same_place, min_det_f, snapped, warn_of_squeezing, worst_place};
 use super::linear_map::LinearMap;
 use super::linearisation::{Linearisation, with_problem};
 use super::modal;
-use super::model::{Drive, Model};
+use super::model::{Drive, Model, usual_solves};
 use super::modes::{Modal, Spectrum};
 use super::motion::Motion;
 use super::pace::{Pace, even_part};
@@ -20,6 +20,7 @@ use super::recover::untangle;
 use super::scheme::Scheme;
 use super::start::accelerations;
 use super::state::{State, are_at_rest};
+use super::swing::{GAINED, Swing, none_before};
 use super::{SimError, SolveError};
 use crate::fem::{At, Configuration, Strain};
 use crate::math::{Mat3, Pose, Vec3, best_fit};
@@ -30,15 +31,21 @@ use crate::solve::{Allowance, Minimiser, Outcome, Problem, Rung, Way};
 const SMALLEST_PIECE: f64 = 1.0 / 64.0;
 /// A piece that turns elements inside out is cut; where the scene allows them, down to this part of the step only.
 const SMALLEST_TO_AVOID_INVERSION: f64 = 1.0 / 8.0;
+/// A piece of load alone that is smaller starts from where the tissue is, if the law does not allow what is predicted.
+const SMALLEST_TO_PREDICT: f64 = 1.0 / 32.0;
 /// What is left of a step that is no further piece.
 const ROUND_OFF: f64 = 1e-9;
 /// Most linear solves of a whole step, in units of `solver.max_iterations`.
 const BUDGET: u32 = 4;
-/// Linear solves and factorisations, as many as are spent on pieces without an answer before the step is refused. No step of the
-/// torture scenes that has an answer wastes more than 164 solves' worth.
-const PATIENCE: (f64, f64) = (240.0, 20.0);
-/// Most of one piece, in the same.
-const MOST_WORK: (f64, f64) = (400.0, 40.0);
+/// Good steps, whose work is spent on pieces without an answer before the step is refused; no step of the torture scenes that has
+/// an answer wastes more than 6.
+const MOST_WASTED: f64 = 10.0;
+/// Most of one piece, in the same: a snap takes up to 22.
+const MOST_OF_A_PIECE: f64 = 24.0;
+/// Most of a step, in the same, however well its pieces go; no step of the torture scenes that has an answer takes more than 32.
+const MOST_OF_A_STEP: f64 = 40.0;
+/// Sizes of the tissue that loads may be predicted to move it by; torture scenes with an answer go to 33.
+const MOST_REACH: f64 = 50.0;
 /// After a piece that succeeded the next one may be this much larger.
 const GROWTH: f64 = 2.0;
 /// Change of ln dt beyond which the stiffness with inertia is factored anew.
@@ -54,10 +61,6 @@ const FRAME_THRESHOLD: f64 = 0.05 * 0.05;
 
 /// Largest turn of a bone that a piece of a step makes, rad; a right angle and some go in one.
 const MOST_TURN: f64 = 2.2;
-/// A bound of |F - 1| up to which no det F can be below 0.1, with some room for elements that are not linear.
-const SMALL_STRAIN: f64 = 0.4;
-/// Growth of that bound after which the elements of a table are looked at again.
-const LOOK_AGAIN: f64 = 2.0;
 
 /// What a step did.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,8 +114,10 @@ pub(super) struct Workspace {
     pivots: Vec<Vec3>,
     u: Vec<Vec3>,
     wrenches: Vec<(Vec3, Vec3)>,
-    /// The largest bound of |F - 1| at which elements of the table were looked at, and the smallest det F found.
-    looked_at: (f64, f64),
+    /// When elements of the table were looked at.
+    look: Look,
+    /// Whether it was told that a free motion gained energy.
+    told_of_gain: bool,
     /// The last step without an answer: asked again, it is not tried again.
     refused: Option<Box<Refused>>,
 }
@@ -182,7 +187,8 @@ impl Workspace {
             u: vec![Vec3::zeros(); model.dofs().prescribed.len()],
             pivots,
             wrenches,
-            looked_at: (0.0, 1.0),
+            look: Look::none(),
+            told_of_gain: false,
             refused: None,
         })
     }
@@ -272,7 +278,22 @@ pub(super) fn advance(
     state: &mut State,
     work: &mut Workspace,
     dt: f64,
+    watch: Option<&mut dyn FnMut(&State)>,
+) -> Result<StepReport, SimError> {
+    let more = f64::from(state.most_solves)
+        / f64::from(usual_solves(model.parts().inertia.as_ref(), model.parts().strategy.max_iterations));
+    let most = MOST_OF_A_STEP * more.max(1.0) * work.minimiser.good_step();
+    advance_within(model, state, work, dt, watch, most)
+}
+
+/// The same for the work of `most` linear solves, forces and factors counted by what they take of one.
+fn advance_within(
+    model: &Arc<Model>,
+    state: &mut State,
+    work: &mut Workspace,
+    dt: f64,
     mut watch: Option<&mut dyn FnMut(&State)>,
+    most: f64,
 ) -> Result<StepReport, SimError> {
     check_inputs(model, &state.inputs)?;
     if let Some(again) = work.refused.as_ref().filter(|refused| refused.dt == dt && refused.from == *state) {
@@ -314,12 +335,10 @@ pub(super) fn advance(
     };
     let mut least = least_before;
     let only_bones = moves_only_bones(model, state);
-    let allowance = |(solves, factors): (f64, f64)| match work.minimiser.work_of_a_factor() {
-        // Newton's method is bounded by its count of solves alone.
-        0.0 => f64::INFINITY,
-        factor => solves + factors * factor,
-    };
-    let (mut patience, most_work) = (allowance(PATIENCE), allowance(MOST_WORK));
+    let is_free = state.inputs == state.applied;
+    let good_step = work.minimiser.good_step();
+    let work_at_start = work.minimiser.work();
+    let (mut wasted, mut accepted_at) = (0.0, work_at_start);
     while done < 1.0 {
         let Workspace { pivots, config, inputs, before, .. } = &mut *work;
         let approach = Approach { model, from: &state.applied, to: &state.inputs, pivots, config, done, smallest };
@@ -337,8 +356,9 @@ pub(super) fn advance(
         let t = state.t + to * dt;
         let bound = pace.filter(|_| to - done > smallest);
         let work_before = work.minimiser.work();
-        work.minimiser.set_limit(work_before + most_work);
-        let cut = Cut { t, dt: dt * (to - done), part: to - done, smallest, least, only_bones };
+        let ends_at = accepted_at + most;
+        work.minimiser.set_limit(ends_at.min(work_before + MOST_OF_A_PIECE * good_step));
+        let cut = Cut { t, dt: dt * (to - done), part: to - done, smallest, least, only_bones, is_free };
         match step_piece(model, work, &mut linearisation, &cut, bound, &mut report, &mut least) {
             Ok(()) => {
                 report.substeps += 1;
@@ -349,12 +369,20 @@ pub(super) fn advance(
                     piece = ((to - done) * pace.next(error)).max(smallest);
                     work.motion.next_dt = dt * piece;
                     piece = even_part(1.0 - to, piece);
-                    spent_before = report.iterations;
+                    (spent_before, accepted_at, wasted) = (report.iterations, work.minimiser.work(), 0.0);
                 }
                 if let Some(watch) = watch.as_mut().filter(|_| to < 1.0) {
                     watch(&halfway(model, state, work, &report, t, dt * (to - done)));
                 }
                 done = to;
+            }
+            Err(Setback::Gains) => {
+                work.config.copy_from(&work.before);
+                linearisation = linearised_before;
+                work.motion.dt = none_before(dt * (to - done));
+                if !std::mem::replace(&mut work.told_of_gain, true) {
+                    report.warnings.push(GAINED.into());
+                }
             }
             Err(Setback::Coarse(factor)) => {
                 work.config.copy_from(&work.before);
@@ -365,26 +393,36 @@ pub(super) fn advance(
                 linearisation = linearised_before;
                 piece = 0.5 * (to - done);
                 report.iterations += source.iterations();
-                patience -= work.minimiser.work() - work_before;
+                let source = match source {
+                    SolveError::NotConverged { .. } if done > 0.0 && work.minimiser.work() >= ends_at => {
+                        SolveError::GivenUp { most, steps: most / good_step }
+                    }
+                    source => source,
+                };
+                wasted += work.minimiser.work() - work_before;
                 let spent = report.iterations - spent_before;
                 if source.is_final()
                     || piece < smallest
                     || !model.parts().strategy.has(Rung::Pieces)
-                    || patience <= 0.0
+                    || wasted >= MOST_WASTED * good_step
+                    || work.minimiser.work() >= ends_at
                     || spent > BUDGET * model.parts().strategy.max_iterations
                 {
-                    let is_final = source.is_final();
-                    let may_redo = !is_final && dt > 0.0 && is_way_from_rest_another(model, state);
-                    let again = if may_redo { redo_from_rest(model, state, work, &report, dt)? } else { None };
+                    let left = ends_at - work.minimiser.work();
+                    let may_redo =
+                        !source.is_final() && dt > 0.0 && left > 0.0 && is_way_from_rest_another(model, state);
+                    let again = if may_redo { redo_from_rest(model, state, work, &report, dt, left)? } else { None };
                     if let Some(again) = again {
                         return Ok(again);
                     }
                     let cuts = (1.0 / (to - done)).round() as u32;
                     let place = worst_place(model, &work.config.x).map(Box::new);
-                    let spent = report.iterations;
-                    let error = SimError::Solve { t: state.t, dt, cuts, spent, reached: done, place, source };
+                    let (spent, took) = (report.iterations, work.minimiser.work() - work_at_start);
+                    let ended_by_host = source.is_ended_by_host();
+                    let error =
+                        SimError::Solve { t: state.t, dt, cuts, spent, work: took, reached: done, place, source };
                     // What the host has ended may have an answer.
-                    if is_final {
+                    if ended_by_host {
                         work.config.copy_from(&work.before);
                         return Err(error);
                     }
@@ -432,7 +470,7 @@ fn is_way_from_rest_another(model: &Model, state: &State) -> bool {
     !model.remembers() && !model.is_quadratic() && !shapes && !are_at_rest(model, &state.applied)
 }
 
-/// The step again from rest along the inputs, told; `None` if that has no answer either.
+/// The step again from rest along the inputs for the work of `most` linear solves, told; `None` if that has no answer either.
 ///
 /// # Errors
 /// Where the host ends it.
@@ -442,9 +480,10 @@ fn redo_from_rest(
     work: &mut Workspace,
     so_far: &StepReport,
     dt: f64,
+    most: f64,
 ) -> Result<Option<StepReport>, SimError> {
     let mut fresh = state.at_rest(model);
-    let mut report = match advance(model, &mut fresh, work, 0.0, None) {
+    let mut report = match advance_within(model, &mut fresh, work, 0.0, None, most) {
         Ok(report) => report,
         Err(SimError::Solve { source, .. }) if !source.is_final() => return Ok(None),
         Err(error) => return Err(error),
@@ -558,6 +597,7 @@ fn look_up(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> R
             dt,
             cuts: 1,
             spent: report.iterations,
+            work: 0.0,
             reached: 0.0,
             place: None,
             source,
@@ -584,12 +624,9 @@ fn look_up(model: &Model, state: &mut State, work: &mut Workspace, dt: f64) -> R
     }
     let before = worst_jump(model, &state.config.x);
     read_pivots(model, &state.inputs, &mut work.pivots);
-    // To look at all elements costs many steps: once the bound has grown.
-    if strain_bound > SMALL_STRAIN.max(LOOK_AGAIN * work.looked_at.0) {
+    if work.look.is_due(strain_bound) {
         map.place_whole(model, &state.inputs, &work.pivots, &mut work.config);
-        let least = min_det_f(model, &work.config.x);
-        warn_of_squeezing(model, work.looked_at.1, least, &work.config.x, &mut report.warnings);
-        work.looked_at = (strain_bound, least.min(work.looked_at.1));
+        work.look.take(model, strain_bound, &work.config.x, &mut report.warnings);
     }
     state.config.poses.copy_from_slice(&work.config.poses);
     map.place_seen(model, &state.inputs, &work.pivots, &mut state.config);
@@ -656,6 +693,8 @@ enum Setback {
     Failed(SolveError),
     /// It should be cut to this part of it for the sake of accuracy.
     Coarse(f64),
+    /// It gains energy that nobody gave it.
+    Gains,
 }
 
 impl From<SolveError> for Setback {
@@ -678,6 +717,8 @@ struct Cut {
     least: f64,
     /// Whether nothing but bones moves in it.
     only_bones: bool,
+    /// Whether no input changes.
+    is_free: bool,
 }
 
 /// One piece of a step, from and into `work`; `bound` by an accuracy if it may still be cut. The smallest det F where it ends
@@ -742,7 +783,12 @@ fn step_piece(
         }
         minimiser.set_frame(frame(factored.as_deref(), config));
     }
+    let factorings = minimiser.factorings();
     let potential = minimiser.predict(&problem, config, u);
+    let is_pushed = !problem.is_quadratic() && !untangled && u.iter().all(|u| *u == Vec3::zeros());
+    if is_pushed && piece == 1.0 && !model.remembers() {
+        check_reach(&before.x, &config.x)?;
+    }
     let bones_work = |minimiser: &Minimiser| -> f64 {
         let g = minimiser.nodal_gradient();
         dofs.prescribed.iter().zip(&*u).map(|(&a, u)| g[a as usize].dot(u)).sum()
@@ -758,16 +804,18 @@ fn step_piece(
     };
     let outcome = match minimiser.minimise_by(way, &problem, config) {
         // A small piece of load alone, predicted beyond what the law allows: go there from where the tissue is.
-        Err(SolveError::NotFinite)
-            if piece <= SMALLEST_TO_AVOID_INVERSION && !untangled && u.iter().all(|u| *u == Vec3::zeros()) =>
-        {
+        Err(SolveError::NotFinite) if is_pushed && piece <= SMALLEST_TO_PREDICT => {
             config.copy_from(before);
             minimiser.minimise_by(way, &problem, config)
         }
         outcome => outcome,
     };
     // A piece that is not taken may leave another factor behind than the state remembers.
-    let outcome = outcome.inspect_err(|_| *factored = None)?;
+    let outcome = outcome.inspect_err(|_| {
+        if minimiser.factorings() != factorings {
+            *factored = None;
+        }
+    })?;
     report.count(&outcome);
     if model.folds() {
         *least = min_det_f(model, &config.x);
@@ -799,6 +847,17 @@ fn step_piece(
             tell(report, &message);
         }
     }
+    let mut free = None;
+    if let Some((_, formula)) = formula.as_ref().filter(|_| cut.is_free) {
+        let swing = Swing { model, problem: &problem, motion, formula };
+        if swing.is_watched() {
+            free = swing.judge(before, config, [potential, outcome.energy]);
+            if free.is_none() && motion.dt != none_before(dt) {
+                *factored = None;
+                return Err(Setback::Gains);
+            }
+        }
+    }
     check_depth(model, &before.x, &config.x).inspect_err(|_| *factored = None)?;
     if parts.inertia.as_ref().is_some_and(|i| i.accuracy.is_some()) {
         let error = formula.as_ref().map_or(0.0, |(_, formula)| motion.error(formula, dofs, before, config));
@@ -821,8 +880,18 @@ fn step_piece(
     *last = Some(Piece { number: 0, t, dt, dt_before: motion.dt });
     if let Some((_, formula)) = &formula {
         motion.arrive(formula, dt, dofs, before, config);
+        motion.free = free;
     }
     Ok(())
+}
+
+/// Refuses loads under which the stiffness at hand would let the tissue go by many of its sizes: no law stiffens that much.
+fn check_reach(before: &[Vec3], predicted: &[Vec3]) -> Result<(), SolveError> {
+    let motion = before.iter().zip(predicted).map(|(x, y)| (y - x).norm()).fold(0.0, f64::max);
+    let (low, high) = before.iter().fold((before[0], before[0]), |(l, h), x| (l.inf(x), h.sup(x)));
+    let most = MOST_REACH * (high - low).norm();
+    // What is no number is told by the minimiser.
+    if motion > most { Err(SolveError::BeyondReach { motion, most }) } else { Ok(()) }
 }
 
 /// Adds a warning that is not there yet.
@@ -914,10 +983,6 @@ fn move_along(prescribed: &[u32], config: &mut Configuration, u: &mut [Vec3]) {
     for x in &mut config.x {
         *x = moved(*x);
     }
-}
-
-fn min_det_f(model: &Model, x: &[Vec3]) -> f64 {
-    model.parts().terms.iter().map(|t| t.min_det_f(x)).fold(f64::INFINITY, f64::min)
 }
 
 /// Strain and energy of an accepted state, all of whose nodes are at `x`.

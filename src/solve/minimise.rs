@@ -103,6 +103,32 @@ impl Watch {
     }
 }
 
+/// Tells iterations that only stir round-off: neither the energy falls nor the correction.
+struct Standstill {
+    best: f64,
+    idle: u32,
+}
+
+impl Standstill {
+    fn new() -> Standstill {
+        Standstill { best: f64::INFINITY, idle: 0 }
+    }
+
+    /// Whether an iteration with this correction (m), in which the energy fell beyond its noise or not, is one too many.
+    fn holds(&mut self, correction: f64, fell: bool) -> bool {
+        if fell || correction < SMALLER * self.best {
+            self.idle = 0;
+            self.best = self.best.min(correction);
+        } else {
+            self.idle += 1;
+        }
+        self.idle >= MOST_IDLE
+    }
+}
+
+/// A correction smaller than this part of the best so far is progress; iterations without any that are one too many.
+const SMALLER: f64 = 0.9;
+const MOST_IDLE: u32 = 20;
 /// Fraction of the promised descent that a step must keep.
 const ARMIJO: f64 = 1e-4;
 /// Relative round-off of an energy sum.
@@ -111,6 +137,11 @@ const ENERGY_NOISE: f64 = 1e-12;
 const MAX_SHORTENINGS: u32 = 30;
 /// What the forces take of a linear solve.
 const WORK_OF_FORCES: f64 = 0.3;
+/// Linear solves of a good step, with their forces.
+const GOOD_SOLVES: f64 = 10.0;
+const GOOD_NEWTON: f64 = 25.0;
+/// The stiffnesses that are factored, the true one first.
+const BOTH: [Curvature; 2] = [Curvature::Exact, Curvature::Projected];
 /// Iterations that a shortened step counts for when the factor's age is judged.
 const SHORTENED_AGES: u32 = 4;
 
@@ -124,6 +155,8 @@ pub struct Minimiser {
     /// Rotation from the configuration that was factored to the one at hand.
     frame: Mat3,
     factored: bool,
+    /// Factors that were sought so far.
+    factorings: u64,
     /// Whether that was the true stiffness.
     exact: bool,
     /// Where the factor was made.
@@ -163,6 +196,7 @@ impl Minimiser {
             allowance: Arc::default(),
             frame: Mat3::identity(),
             factored: false,
+            factorings: 0,
             exact: false,
             factored_at: config.clone(),
             trial: config.clone(),
@@ -223,6 +257,17 @@ impl Minimiser {
         if self.strategy.memory == 0 { 0.0 } else { 0.15 * self.factor_len() as f64 / self.n_unknowns().max(1) as f64 }
     }
 
+    /// What a good step takes where it needs a factor, in linear solves: that, and some solves with their forces. Newton's method,
+    /// whose factors do not count, may look for its last digits.
+    pub fn good_step(&self) -> f64 {
+        if self.strategy.memory == 0 { GOOD_NEWTON } else { GOOD_SOLVES + self.work_of_a_factor() }
+    }
+
+    /// Factors that were sought so far: while this stays, the one at hand is the same.
+    pub fn factorings(&self) -> u64 {
+        self.factorings
+    }
+
     /// Whether a factor is at hand.
     pub fn is_factored(&self) -> bool {
         self.factored
@@ -249,17 +294,28 @@ impl Minimiser {
     /// [`SolveError::Singular`] if even the projected stiffness is not positive definite, [`SolveError::NotFinite`] where
     /// the energy is not defined.
     pub fn linearise(&mut self, problem: &Problem, config: &Configuration) -> Result<(), SolveError> {
+        self.linearise_as(&BOTH, problem, config)
+    }
+
+    /// The same with these stiffnesses in turn.
+    fn linearise_as(
+        &mut self,
+        curvatures: &[Curvature],
+        problem: &Problem,
+        config: &Configuration,
+    ) -> Result<(), SolveError> {
         self.allowance.check()?;
         self.lag.copy_from(config);
         self.factored_at.copy_from(config);
         let energy = problem.gradient(config, &self.lag, &mut self.nodal, &mut self.g);
         self.factored = false;
+        self.factorings += 1;
         if !energy.is_finite() {
             return Err(SolveError::NotFinite);
         }
         self.frame = Mat3::identity();
         self.memory.forget();
-        for curvature in [Curvature::Exact, Curvature::Projected] {
+        for &curvature in curvatures {
             self.work += self.work_of_a_factor();
             problem.assemble(&mut self.assembly, config, &self.nodal, curvature);
             match self.solver.factor(&self.assembly.K) {
@@ -342,6 +398,9 @@ impl Minimiser {
             crossed: false,
         };
         let mut age = 0;
+        let mut rest = Standstill::new();
+        // While steps have to be shortened, a true stiffness that was indefinite is not tried again.
+        let mut indefinite = false;
         self.memory.forget();
         self.lag.copy_from(config);
         self.trial.copy_from(config);
@@ -358,7 +417,8 @@ impl Minimiser {
         loop {
             let stale = newton && outcome.iterations > 0 && !problem.is_quadratic();
             if !self.factored || stale || age >= self.strategy.refresh_after.max(2) && !problem.is_quadratic() {
-                self.linearise(problem, config)?;
+                let skipped = usize::from(indefinite && self.strategy.has(Rung::Projection));
+                self.linearise_as(&BOTH[skipped..], problem, config)?;
                 outcome.factorisations += 1;
                 age = 0;
             }
@@ -385,6 +445,8 @@ impl Minimiser {
             }
             match self.search(problem, config, energy, slope) {
                 Some((alpha, new_energy)) => {
+                    let fell = energy - new_energy > ENERGY_NOISE * (energy.abs() + new_energy.abs());
+                    let stands = rest.holds(outcome.correction, fell);
                     if self.strategy.has(Rung::Memory) {
                         self.memory.remember(alpha, &self.d, &self.g, &self.g_trial);
                     }
@@ -395,7 +457,11 @@ impl Minimiser {
                     if outcome.crossed && upright {
                         return Err(SolveError::Inverts { iterations: outcome.iterations });
                     }
+                    indefinite = alpha < 1.0 && !self.exact;
                     age += if alpha < 1.0 { SHORTENED_AGES } else { 1 };
+                    if stands && !last {
+                        return Err(self.not_converged(outcome));
+                    }
                 }
                 // A step below the tolerance that round-off cannot tell from none is no failure.
                 None if last => {

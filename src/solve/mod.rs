@@ -117,6 +117,27 @@ pub enum SolveError {
         /// Name of the contact.
         contact: String,
     },
+    /// The loads are too large for any answer that makes sense.
+    #[error(
+        "the loads would move the tissue by {motion:.1e} m if it stayed as stiff as it is, more than fifty times its size          ({most:.1e} m): no law carries that; check their units (N, Pa)"
+    )]
+    BeyondReach {
+        /// Predicted motion, m.
+        motion: f64,
+        /// Most, m.
+        most: f64,
+    },
+    /// Pieces of the step have answers, but at a cost that promises no end.
+    #[error(
+        "the step was given up after the work of {most:.0} linear solves, what {steps:.0} good steps take, though parts of it \
+         have answers: move or load the tissue less at once"
+    )]
+    GivenUp {
+        /// Work, in linear solves.
+        most: f64,
+        /// The same in good steps.
+        steps: f64,
+    },
     /// The step has spent what it may.
     #[error(
         "the step was given up after {most} linear solves, the most that it may take (`most_solves` of [solver], port \
@@ -155,6 +176,8 @@ impl SolveError {
             | SolveError::Swallowed { .. }
             | SolveError::TooLarge { .. }
             | SolveError::Memory { .. }
+            | SolveError::BeyondReach { .. }
+            | SolveError::GivenUp { .. }
             | SolveError::Spent { .. }
             | SolveError::Cancelled
             | SolveError::Modes { .. } => 1,
@@ -163,6 +186,11 @@ impl SolveError {
 
     /// Whether a smaller piece of the step is not to be tried.
     pub fn is_final(&self) -> bool {
+        self.is_ended_by_host() || matches!(self, SolveError::BeyondReach { .. } | SolveError::GivenUp { .. })
+    }
+
+    /// Whether it says nothing about the answer.
+    pub fn is_ended_by_host(&self) -> bool {
         matches!(self, SolveError::Spent { .. } | SolveError::Cancelled)
     }
 }

@@ -13,6 +13,9 @@ use crate::solve::Rung;
 /// Most linear solves of one step; five times the scene's default of 200, and some.
 const MOST_SOLVES: u32 = 1200;
 
+/// Most work of a refused step, in good ones; what docs/torture.md says.
+const MOST_OF_A_REFUSAL: f64 = 41.0;
+
 /// What a case may use and what it took.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tally {
@@ -20,6 +23,8 @@ pub struct Tally {
     pub without: Option<Rung>,
     /// Linear solves, those spent in vain included.
     pub iterations: u32,
+    /// Largest work of a refused step, in good ones.
+    pub refused: f64,
     /// Smallest det F of all accepted steps; +inf before the first.
     pub min_det_f: f64,
     /// Strain energy after the last accepted step, J.
@@ -28,7 +33,7 @@ pub struct Tally {
 
 impl Default for Tally {
     fn default() -> Self {
-        Tally { without: None, iterations: 0, min_det_f: f64::INFINITY, energy: 0.0 }
+        Tally { without: None, iterations: 0, refused: 0.0, min_det_f: f64::INFINITY, energy: 0.0 }
     }
 }
 
@@ -120,8 +125,13 @@ impl<'a> Trial<'a> {
                 self.check_finite()
             }
             Err(e) => {
-                if let SimError::Solve { spent, .. } = e {
+                if let SimError::Solve { spent, work, .. } = e {
                     self.tally.iterations += spent;
+                    let took = work / self.sim.good_step();
+                    self.tally.refused = self.tally.refused.max(took);
+                    if took > MOST_OF_A_REFUSAL {
+                        return fail(format!("a refused step took as much as {took:.0} good ones"));
+                    }
                     if spent > MOST_SOLVES {
                         return fail(format!("a refused step took {spent} linear solves"));
                     }

@@ -496,3 +496,22 @@ fn scenes_that_are_not_linear_are_told_so() {
     let mixed = format!("{block}{linear}pressure = \"nodal\"\n[inertia]\nmodes = 4\ndamping_stiffness = 1e-3\n");
     assert!(cutis::load::from_text(&mixed, None).err().expect("mixed").to_string().contains("mix the modes"));
 }
+
+/// Modes let tissue turn inside out as linear tables do, and tell of it once; small motions cost no look at the elements.
+#[test]
+fn elements_that_modes_turn_inside_out_are_told_once() {
+    for modes in ["modes = 3\n", "modes = 40\n"] {
+        let mut sim = sim(&scene("", modes));
+        sim.initialise().expect("rest");
+        let (mut told, mut first) = (0, f64::INFINITY);
+        for k in 1..=20 {
+            set(&mut sim, "bone.translation", 3, &[-0.004 * f64::from(k), 0.0, 0.0]);
+            let report = sim.step(0.5).expect("a step");
+            if report.warnings.iter().any(|w| w.contains("inside out") && w.contains("mm at rest")) {
+                (told, first) = (told + 1, first.min(get(&sim, "quality.minDetF")[0]));
+            }
+        }
+        assert!(told == 1 && first <= 0.0, "{modes}: told {told} times, at {first}");
+        assert!(get(&sim, "quality.minDetF")[0] < -0.1);
+    }
+}

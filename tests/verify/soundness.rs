@@ -141,6 +141,39 @@ fn a_refusal_says_where_and_how_far_and_is_not_worked_out_twice() {
     sim.step(1.0).expect("less far");
 }
 
+/// A thousand times what the head is pushed with otherwise takes bounded work, ten thousand times next to none, and the head goes on.
+#[test]
+fn loads_beyond_sense_are_refused_for_little() {
+    let mut sim =
+        sim(&std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/fmu/scene.toml")).expect("the scene"));
+    sim.initialise().expect("rest");
+    for (force, most) in [(1e3, 41.0), (1e4, 1.0), (1e6, 1.0)] {
+        set(&mut sim, "load.force", 0, &[0.0, force, 0.0]);
+        let error = sim.step(0.1).expect_err("no tissue bears that");
+        let SimError::Solve { work, .. } = &error else { panic!("{error}") };
+        assert!(*work <= most * sim.good_step(), "{force} N: the work of {work:.0} solves; {error}");
+    }
+    set(&mut sim, "load.force", 0, &[0.0, 1.0, 0.0]);
+    sim.step(0.1).expect("a common load");
+}
+
+/// A host that allows more solves than usual gets a longer search.
+#[test]
+fn more_solves_buy_answers_that_cost_more() {
+    let scene = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/fmu/scene.toml")).expect("the scene");
+    for (most, answered) in [(1000, false), (4000, true)] {
+        let mut sim = sim(&scene);
+        sim.initialise().expect("rest");
+        let port = crate::common::port(&sim, "solver.mostSolves");
+        sim.set_i32(port, 0, &[most]).expect("a bound");
+        set(&mut sim, "bone.rotation", 3, &[0.0, 0.0, 1.5]);
+        let outcome = sim.step(0.1);
+        assert_eq!(outcome.is_ok(), answered, "{most}: {outcome:?}");
+        let given_up = |e: &SimError| matches!(e, SimError::Solve { source: SolveError::GivenUp { .. }, .. });
+        assert!(answered || outcome.is_err_and(|e| given_up(&e)));
+    }
+}
+
 #[test]
 fn full_activation_is_answered_by_the_default_law() {
     let scene = format!(
