@@ -28,8 +28,9 @@ pub(super) fn mend(mesh: &mut TetMesh, told: &mut Vec<String>) {
     let [low, high] = bounds(mesh);
     let size = high - low;
     if !(HEAD[0]..=HEAD[1]).contains(&size.max()) {
+        let slip = if size.max() > HEAD[1] { "is it in millimetres?" } else { "was it scaled once too often?" };
         told.push(format!(
-            "the mesh measures {:.4} x {:.4} x {:.4} m, which is no head: lengths are metres; is it in millimetres?",
+            "the mesh measures {:.3e} x {:.3e} x {:.3e} m, which is no head: lengths are metres; {slip}",
             size.x, size.y, size.z
         ));
     }

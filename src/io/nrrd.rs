@@ -79,6 +79,7 @@ pub(super) fn read(path: &Path, told: &mut Vec<String>) -> Result<Volume, IoErro
     header.plain_samples()?;
     let dims = space.map(|(_, n)| n);
     let (axes, origin) = header.orientation(space.map(|(axis, _)| axis))?;
+    header.tell_what_is_guessed(told);
     let grid = ct::grid(path, dims, axes, origin)?;
     let skip = header.skip()?;
     let encoding = header.get("encoding").to_ascii_lowercase();
@@ -311,6 +312,13 @@ impl<'a> Header<'a> {
         let parsed = inner.map(|t| t.split(',').map(|w| w.trim().parse().ok()).collect::<Option<Vec<f64>>>());
         let three = parsed.flatten().and_then(|v| <[f64; 3]>::try_from(v).ok());
         three.map(Vec3::from).ok_or_else(|| self.slip(key, text, "three numbers a vector, such as (1,0,0)"))
+    }
+
+    /// Says where the volume lies by no word of its own.
+    fn tell_what_is_guessed(&self, told: &mut Vec<String>) {
+        if self.get("space origin").is_empty() {
+            told.push("no `space origin`: the first voxel is taken to lie at (0, 0, 0)".into());
+        }
     }
 
     /// Steps of these axes and position of the first voxel in LPS millimetres.

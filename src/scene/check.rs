@@ -45,8 +45,9 @@ impl Text<'_> {
         found: &dyn std::fmt::Display,
     ) -> SceneError {
         let key = find(table, name);
+        let wanted = if key.range == Range::Any { "a finite number".to_owned() } else { key.range.to_string() };
         let unit = if key.unit.is_empty() { String::new() } else { format!(" {}", key.unit) };
-        self.at(at.span().start, format!("`{name}` of [{table}] is {found}{unit}; wanted {}", key.range))
+        self.at(at.span().start, format!("`{name}` of [{table}] is {found}{unit}; wanted {wanted}"))
     }
 
     pub fn checked(&self, table: &str, name: &str, value: &Spanned<f64>) -> Result<f64, SceneError> {

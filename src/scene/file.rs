@@ -5,6 +5,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::SceneError;
+use super::check::Text;
 
 /// A vector with the place where it stands in the text.
 pub type Triple = Spanned<[f64; 3]>;
@@ -348,15 +349,36 @@ impl SceneFile {
     /// Reads a scene.
     ///
     /// # Errors
-    /// [`SceneError::Syntax`] with line, column and choices.
+    /// [`SceneError::Meaning`] with line, column and choices.
     pub fn parse(text: &str) -> Result<SceneFile, SceneError> {
-        toml::from_str(text).map_err(|e| SceneError::Syntax(plain(e.to_string().trim_end())))
+        toml::from_str(text).map_err(|e| slip(text, &e))
+    }
+}
+
+/// What the parser says of `text`, with line and column.
+pub(super) fn slip(text: &str, error: &toml::de::Error) -> SceneError {
+    let at = error.span().map_or(0, |span| span.start);
+    Text(text).at(at, plain(&lacking(text, at, error.message())))
+}
+
+/// Where `message` misses a key, the same with the table that lacks it: the one whose heading stands at `at`.
+fn lacking(text: &str, at: usize, message: &str) -> String {
+    let Some(key) = message.strip_prefix("missing field ") else { return message.to_owned() };
+    let heading = text[at.min(text.len())..].lines().next().unwrap_or_default().trim();
+    match heading.rfind(']') {
+        Some(end) if heading.starts_with('[') && !(at == 0 && key == "`mesh`") => {
+            format!("{} lacks {key}", &heading[..=end])
+        }
+        _ if key == "`mesh`" => "the scene lacks the table [mesh]".to_owned(),
+        _ => format!("{key} is missing"),
     }
 }
 
 /// The message of the parser in words of a scene instead of those of the program's types.
 fn plain(message: &str) -> String {
-    const WORDS: [(&str, &str); 16] = [
+    const WORDS: [(&str, &str); 18] = [
+        ("unknown field ", "unknown key "),
+        ("missing field ", "missing key "),
         ("invalid type: map, expected a sequence", "found one table, wanted an array of tables: [[name]]"),
         (
             "data did not match any variant of untagged enum Constant",

@@ -101,6 +101,9 @@ impl Builder<'_> {
                     r.ok_or_else(|| self.text.unknown("region", name, mesh.region_names.iter().map(String::as_str)))?;
                 if material[r] == usize::MAX {
                     material[r] = k;
+                } else if material[r] != k && file.tissue[material[r]].regions.is_some() {
+                    let message = format!("region `{}` is made of another [[tissue]] already", name.get_ref());
+                    return Err(self.text.at(name.span().start, message));
                 }
             }
         }
@@ -110,6 +113,10 @@ impl Builder<'_> {
                 mesh.region_names[r]
             );
             return Err(self.text.at(file.mesh.span().start, message));
+        }
+        for k in (0..file.tissue.len()).filter(|k| !material.contains(k)) {
+            let (n, of) = (k + 1, file.tissue.len());
+            warnings.push(format!("[[tissue]] {n} of {of} makes no region of the mesh: those before it take them all"));
         }
         let fields = Fields { mesh, bones: attached(&file.bone, mesh), depth: OnceCell::new() };
         let mut out = Terms::default();

@@ -38,10 +38,8 @@ pub use tables::packed;
 /// Why a scene was refused; line and column are 1-based.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// The text is no TOML, or a key is unknown, missing or of the wrong type. Says line, column and choices.
-    #[error("{0}")]
-    Syntax(String),
-    /// A value means nothing: out of range, or a name that does not exist.
+    /// The text is no TOML, a key is unknown, missing or of the wrong type, or a value means nothing: out of range, or a name that
+    /// does not exist.
     #[error("line {line}, column {column}: {message}")]
     Meaning {
         /// Line.

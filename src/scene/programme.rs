@@ -95,6 +95,7 @@ fn sample(frames: &[(f64, Vec<f64>)], t: f64) -> Vec<f64> {
 impl Builder<'_> {
     pub(super) fn tracks(&self, file: &SceneFile, ports: &[Port]) -> Result<Vec<Track>, SceneError> {
         let mut tracks: Vec<Track> = Vec::new();
+        let mut given: Vec<(usize, std::ops::Range<usize>, f64)> = Vec::new();
         for frame in &file.keyframe {
             let keyed = |p: &Port| {
                 matches!(p.causality, Causality::Input | Causality::TunableParameter) && p.ty == Type::Float64
@@ -138,6 +139,22 @@ impl Builder<'_> {
                 }
             }
             let t = self.text.checked("keyframe", "t", &frame.t)?;
+            let range = offset..offset + len;
+            let meets = |(other, of, _): &&(usize, std::ops::Range<usize>, f64)| {
+                *other == port && of.start < range.end && range.start < of.end
+            };
+            for (_, of, before) in given.iter().filter(meets) {
+                if *of != range {
+                    let message = format!("`{wanted}` has keyframes with and without `row`: which hold is not said");
+                    return Err(self.text.at(frame.port.span().start, message));
+                }
+                if *before == t {
+                    let message =
+                        format!("two keyframes give `{wanted}` values at t = {t} s: for a jump set them a step apart");
+                    return Err(self.text.at(frame.t.span().start, message));
+                }
+            }
+            given.push((port, range, t));
             let same =
                 |track: &&mut Track| track.port == port && track.offset == offset && track.frames[0].1.len() == len;
             match tracks.iter_mut().find(same) {

@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use toml::{Table, Value};
 
 use super::SceneError;
+use super::file::slip;
 
 /// What tells where the tissue and its skin come from: both stand for themselves in a model.
 const SHAPE: [&str; 2] = ["mesh", "skin"];
@@ -17,13 +18,13 @@ const OF_ELEMENTS: [&str; 2] = ["order", "curved"];
 
 /// The tables of a scene. Numbers beyond what TOML can hold are refused here, though a key may take them.
 fn tables(text: &str) -> Result<Table, SceneError> {
-    text.parse().map_err(|e: toml::de::Error| SceneError::Syntax(e.to_string().trim_end().to_owned()))
+    text.parse().map_err(|e: toml::de::Error| slip(text, &e))
 }
 
 /// What identifies a model beside its mesh: everything that the scene says of it, in one spelling.
 ///
 /// # Errors
-/// [`SceneError::Syntax`].
+/// [`SceneError::Meaning`].
 pub(super) fn identity(text: &str) -> Result<String, SceneError> {
     let mut scene = tables(text)?;
     SHAPE.iter().chain(&ASIDE).for_each(|key| drop(scene.remove(*key)));
@@ -68,7 +69,7 @@ fn spell(value: &Value, out: &mut String) {
 /// The same scene with its tissue read from `file`, which carries its skin, too.
 ///
 /// # Errors
-/// [`SceneError::Syntax`].
+/// [`SceneError::Meaning`].
 pub fn packed(text: &str, file: &str) -> Result<String, SceneError> {
     let mut scene = tables(text)?;
     let given = scene.remove("mesh").and_then(|mesh| mesh.as_table().cloned()).unwrap_or_default();

@@ -152,6 +152,32 @@ fn the_key_reference_in_docs_is_up_to_date() {
 }
 
 /// Two bones side by side in a fine block: each further ring frees more.
+/// A bone that a force drives turns about the line of its nodes with nothing to hold it, whether it has a mass or not.
+#[test]
+fn a_bone_that_a_force_drives_is_no_line() {
+    let scene = |within: &str, inertia: &str| {
+        format!("{GOOD}[[bone]]\nname = \"jaw\"\nnodes = \"x_max\"\ndrive = \"force\"\nwithin = {within}\n{inertia}")
+    };
+    for inertia in ["", "[inertia]\n"] {
+        let message = refused(&scene("[[0, 0, 0], [1, 0, 0.011]]", inertia));
+        for part in ["line 11, column 8", "bone `jaw`", "2 node(s)", "inertia tensor is singular", "at least 3 nodes"] {
+            assert!(message.contains(part), "`{part}`: {message}");
+        }
+        sim(&scene("[[0, 0, 0], [1, 0.011, 0.011]]", inertia)).initialise().expect("three corners and a middle");
+    }
+}
+
+#[test]
+fn a_region_is_made_of_one_tissue() {
+    let twice = GOOD
+        .replace("[[bone]]", "regions = [\"tissue\"]\n[[tissue]]\nregions = [\"tissue\"]\nE = 2e4\nnu = 0.4\n[[bone]]");
+    let message = refused(&twice);
+    assert!(
+        message.contains("line 9") && message.contains("region `tissue` is made of another [[tissue]]"),
+        "{message}"
+    );
+}
+
 #[test]
 fn each_ring_frees_more() {
     let scene = |from: f64, rings: u32| {
@@ -192,6 +218,10 @@ fn values_beyond_sense_are_told() {
             format!("{block}[[keyframe]]\nt = 9.0\nport = \"bone.rotation\"\nrow = \"jaw\"\nvalue = [0, 0.1, 0]\n"),
             "after the end of [run]",
         ),
+        (
+            block.replace("[[bone]]\nname = \"skull\"", "[[tissue]]\nE = 1e3\nnu = 0.4\n[[bone]]\nname = \"skull\""),
+            "[[tissue]] 2 of 2 makes no region",
+        ),
     ] {
         assert!(told(&scene).contains(wanted), "{wanted}: {}", told(&scene));
     }
@@ -214,6 +244,22 @@ fn starts_and_keyframes_keep_to_the_range_of_their_input() {
         (format!("{block}rotation = [0, 0, 1000]\n"), "`bone.rotation` of `jaw` starts at 1000 rad"),
         (format!("{block}[gravity]\nacceleration = [0, 0, -98100000]\n"), "`gravity` starts at -98100000"),
         (frame("bone.translation", "skull", "[0, 0, 0.01]"), "bone `skull` cannot be set: its `drive` is not \"pose\""),
+        (
+            format!(
+                "{}{}",
+                frame("bone.rotation", "jaw", "[0, 0, 0.1]"),
+                &frame("bone.rotation", "jaw", "[0, 0, 0.2]")[block.len()..]
+            ),
+            "two keyframes give `bone.rotation` values at t = 1 s",
+        ),
+        (
+            format!(
+                "{}[[keyframe]]\nt = 0.5\nport = \"bone.rotation\"\nvalue = [0, 0, 0, 0, 0, 0.2]\n",
+                frame("bone.rotation", "jaw", "[0, 0, 0.1]")
+            ),
+            "with and without `row`",
+        ),
+        (format!("{block}pivot = [nan, 0, 0]\n"), "wanted a finite number"),
         (frame("solver.mostSolves", "jaw", "3"), "unknown input `solver.mostSolves`"),
     ] {
         let message = refused(&scene);
@@ -272,9 +318,27 @@ fn errors_of_the_parser_are_put_plainly() {
         ("name = \"skull\"", "name = 3", "wanted text in quotes"),
         ("[mesh.block]", "[[mesh.block]]", "wanted a"),
         ("cells = [4, 2, 2]", "cells = [4.5, 2, 2]", "wanted a whole number"),
+        (GOOD, "[[tissue]]\nE = 1e4\n", "line 1, column 1: the scene lacks the table [mesh]"),
+        ("cells = [4, 2, 2]\n", "", "line 1, column 1: [mesh.block] lacks `cells`"),
+        ("name = \"skull\"\n", "", "line 7, column 1: [[bone]] lacks `name`"),
+        ("name = \"skull\"", "name = \"skull\"\ncolour = 3", "line 9, column 1: unknown key `colour`"),
+        ("nu = 0.4", "nu = ", "line 6, column "),
     ] {
         let message = refused(&GOOD.replace(from, to));
-        let own = ["expected a ", "untagged", "struct", "enum", "invalid type", "f64", "u32", "usize", "sequence"];
+        let own = [
+            "expected a ",
+            "missing field",
+            "unknown field",
+            "parse error",
+            "untagged",
+            "struct",
+            "enum",
+            "invalid type",
+            "f64",
+            "u32",
+            "usize",
+            "sequence",
+        ];
         assert!(message.contains(wanted), "{to}: {message}");
         assert!(!own.iter().any(|word| message.contains(word)), "{to}: {message}");
     }
