@@ -4,8 +4,6 @@
 //! solver tries on its way (a division by zero that is caught a line later) is no reason to die. So every call computes in the
 //! default environment and gives the host its own back, sticky flags included; so do the host's callbacks in between.
 
-use std::cell::Cell;
-
 #[cfg(target_arch = "x86_64")]
 mod machine {
     use std::arch::asm;
@@ -89,37 +87,20 @@ mod machine {
     pub(super) fn give_back(_: &Environment) {}
 }
 
-thread_local! {
-    /// That of the host of the innermost call under way on this thread. Nothing to destroy, so that nothing outlives the library.
-    static HOST: Cell<Option<machine::Environment>> = const { Cell::new(None) };
-}
-
-/// Our environment, until it is dropped.
+/// Our environment, until it is dropped; calls may stand within calls.
 pub(super) struct Ours {
-    around: Option<machine::Environment>,
+    host: machine::Environment,
 }
 
 impl Ours {
     /// Puts that of the host away.
     pub(super) fn begin() -> Ours {
-        let host = machine::put_away();
-        Ours { around: HOST.replace(Some(host)) }
+        Ours { host: machine::put_away() }
     }
 }
 
 impl Drop for Ours {
     fn drop(&mut self) {
-        if let Some(host) = HOST.replace(self.around) {
-            machine::give_back(&host);
-        }
+        machine::give_back(&self.host);
     }
-}
-
-/// Runs a callback of the host in its own environment, which it may change.
-pub(super) fn of_host<R>(callback: impl FnOnce() -> R) -> R {
-    let Some(host) = HOST.get() else { return callback() };
-    machine::give_back(&host);
-    let answer = callback();
-    HOST.set(Some(machine::put_away()));
-    answer
 }

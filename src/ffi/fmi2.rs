@@ -525,9 +525,8 @@ pub unsafe extern "C-unwind" fn fmi2DoStep(
 ) -> Status {
     let _ = noSetFMUStatePriorToCurrentPoint;
     let body = |i: &mut Instance2| {
-        let status = i
-            .common
-            .answer(table::DO_STEP, modes::ERROR, |i| i.step(currentCommunicationPoint, communicationStepSize, None));
+        let status =
+            i.common.answer(table::DO_STEP, modes::ERROR, |i| i.step(currentCommunicationPoint, communicationStepSize));
         if status == Status::Discard {
             i.common.mode = modes::STEP_FAILED;
         }

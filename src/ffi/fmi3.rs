@@ -10,7 +10,9 @@ use std::ffi::{c_char, c_void};
 use std::path::Path;
 
 use super::guard::{self, Handle};
-use super::instance::{Answer, Inside, Instance, Instance3, Readable, Update, answered, error};
+use super::instance::{
+    Answer, Inside, Instance, Instance3, Readable, Update, answered, answered_with_callbacks, error,
+};
 use super::logger::{Callback, Category, LogMessage3, Logger, Status, Told};
 use super::modes::{self, Call, fmi3 as table};
 use super::pointer::{place, slice, slice_mut, text};
@@ -863,35 +865,32 @@ pub unsafe extern "C-unwind" fn fmi3DoStep(
             *flag = 0;
         }
     }
+    let handle = instance.cast::<Handle<Instance3>>();
+    let outputs = [eventHandlingNeeded, terminateSimulation, earlyReturn];
+    let complete = !outputs.iter().any(|p| p.is_null()) && !lastSuccessfulTime.is_null();
+    let (at, dt) = (currentCommunicationPoint, communicationStepSize);
     let body = |i: &mut Instance3| {
-        let Instance3 { common, update } = i;
-        let mut watch = update.as_ref().map(|update| {
-            |inside: &Inside| {
-                // SAFETY: we are inside a call on this very handle, on this thread.
-                unsafe {
-                    guard::offering(instance.cast::<Handle<Instance3>>(), (&raw const *inside).cast(), || {
-                        update.tell(inside)
-                    })
-                }
-            }
-        });
-        let status = common.answer(table::DO_STEP, modes::ERROR, |i| {
-            if [eventHandlingNeeded, terminateSimulation, earlyReturn].iter().any(|p| p.is_null())
-                || lastSuccessfulTime.is_null()
-            {
-                return Err(error("an output argument is NULL"));
-            }
-            let watch = watch.as_mut().map(|watch| watch as &mut dyn FnMut(&Inside));
-            i.step(currentCommunicationPoint, communicationStepSize, watch)
-        });
+        let status = if !complete || i.update.is_none() {
+            guard::caught(|| {
+                i.common.answer(table::DO_STEP, modes::ERROR, |i| match complete {
+                    true => i.step(at, dt),
+                    false => Err(error("an output argument is NULL")),
+                })
+            })
+        } else {
+            i.step_watched(table::DO_STEP, at, dt, |update, inside| {
+                // SAFETY: we are inside a call on this very handle, on this thread, between what `step_watched` catches.
+                unsafe { guard::offering(handle, (&raw const *inside).cast(), || update.tell(inside)) }
+            })
+        };
         // SAFETY: null, or the host's place for a time.
         if let Ok(time) = unsafe { place(lastSuccessfulTime, "") } {
-            *time = common.sim.time();
+            *time = i.common.sim.time();
         }
         status
     };
     // SAFETY: the host's promise about its instance.
-    unsafe { answered(instance.cast::<Handle<Instance3>>(), body) }
+    unsafe { answered_with_callbacks(handle, body) }
 }
 
 impl Update {

@@ -124,6 +124,37 @@ pub(super) unsafe fn with<T: Guarded, R>(handle: *mut Handle<T>, body: impl FnOn
     outcome
 }
 
+/// Gives a handle back, also while a host's exception passes through.
+struct Release<'a, T>(&'a Handle<T>);
+
+impl<T> Drop for Release<'_, T> {
+    fn drop(&mut self) {
+        self.0.offered.store(std::ptr::null_mut(), Ordering::Release);
+        self.0.busy.store(false, Ordering::Release);
+    }
+}
+
+/// As [`with`], for a body that calls the host in between: it catches what it does itself in [`caught`] and answers with the message
+/// of a panic. So the host's callbacks stand outside of all that catches, and an exception of theirs goes on to the host.
+///
+/// # Safety
+/// As for [`enter`].
+pub(super) unsafe fn with_callbacks<T: Guarded, R>(
+    handle: *mut Handle<T>,
+    body: impl FnOnce(&mut T) -> Result<R, String>,
+) -> Result<R, Denied> {
+    // SAFETY: the caller's promise.
+    let this = unsafe { enter(handle)? };
+    let _release = Release(this);
+    // SAFETY: `busy` was ours to set, so no other reference to the value exists until it is cleared by `_release`.
+    let outcome = body(unsafe { &mut *this.value.get() });
+    outcome.map_err(|why| {
+        // SAFETY: the body's borrow ended with it.
+        unsafe { &mut *this.value.get() }.poison(why);
+        Denied::Panicked
+    })
+}
+
 /// Ends the call that is under way in a handle before its next linear solve; nothing where there is none. From any thread.
 /// Returns whether there was one.
 ///
@@ -152,16 +183,16 @@ fn this_thread() -> usize {
     HERE.with(|here| std::ptr::from_ref(here) as usize)
 }
 
-/// Runs `callback`, inside which this thread gets `view` from [`offered`].
+/// Runs `callback`, inside which this thread gets `view` from [`offered`]; if it throws, [`with_callbacks`] takes that back.
 ///
 /// # Safety
-/// `handle` is live, and a call on it is under way on this thread.
+/// `handle` is live, and a call on it is under way on this thread, in [`with_callbacks`] and outside of [`caught`].
 pub(super) unsafe fn offering<T: Guarded>(handle: *mut Handle<T>, view: *const c_void, callback: impl FnOnce()) {
     // SAFETY: the caller's promise; only atomics are touched.
     let this = unsafe { &*handle };
     this.thread.store(this_thread(), Ordering::Relaxed);
     this.offered.store(view.cast_mut(), Ordering::Release);
-    floats::of_host(callback);
+    callback();
     this.offered.store(std::ptr::null_mut(), Ordering::Release);
 }
 

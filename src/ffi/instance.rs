@@ -163,7 +163,21 @@ impl Instance {
     }
 
     /// Advances from `at` by `dt`, s. A step that fails leaves everything as it was and is a Discard.
-    pub(super) fn step(&mut self, at: f64, dt: f64, watch: Option<&mut dyn FnMut(&Inside)>) -> Answer {
+    pub(super) fn step(&mut self, at: f64, dt: f64) -> Answer {
+        self.check_step(at, dt)?;
+        let stepped = self.sim.step(dt);
+        self.conclude(stepped)
+    }
+
+    /// What came of a step.
+    fn conclude(&self, stepped: Result<StepReport, SimError>) -> Answer {
+        let report = stepped.map_err(|why| discard(chain(&why)))?;
+        self.tell("step", &report);
+        Ok(())
+    }
+
+    /// Whether a step from `at` by `dt`, s, may be made.
+    fn check_step(&self, at: f64, dt: f64) -> Answer {
         if !(dt.is_finite() && dt > 0.0) {
             return Err(error(format!("communication step size {dt} is not positive and finite")));
         }
@@ -176,13 +190,6 @@ impl Instance {
         if let Some(stop) = self.stop.filter(|&stop| t + dt > stop + TIME_ROUNDING * stop.abs().max(dt)) {
             return Err(error(format!("step from {t} by {dt} passes the stop time {stop}")));
         }
-        let Self { sim, logger, .. } = self;
-        let stepped = match watch {
-            Some(watch) => sim.step_watched(dt, &mut |view| watch(&Inside { view, logger })),
-            None => sim.step(dt),
-        };
-        let report = stepped.map_err(|why| discard(chain(&why)))?;
-        self.tell("step", &report);
         Ok(())
     }
 
@@ -553,6 +560,41 @@ pub(super) struct Update {
     pub(super) environment: *mut std::ffi::c_void,
 }
 
+impl Instance3 {
+    /// The same as [`Instance::step`], piece by piece, each of which `show` shows to the host outside of all that catches: an
+    /// exception of the host leaves the state of the last accepted step.
+    ///
+    /// # Errors
+    /// The message of a panic.
+    pub(super) fn step_watched(
+        &mut self,
+        call: Call,
+        at: f64,
+        dt: f64,
+        mut show: impl FnMut(&Update, &Inside),
+    ) -> Result<Status, String> {
+        let Instance3 { common, update } = self;
+        let may = guard::caught(|| common.answer(call, modes::ERROR, |i| i.check_step(at, dt)))?;
+        let Some(update) = update.as_ref().filter(|_| may == Status::Ok) else { return Ok(may) };
+        let Instance { sim, logger, .. } = common;
+        let stepped = match guard::caught(|| sim.begin(dt))? {
+            Err(why) => Err(why),
+            Ok(mut step) => loop {
+                match guard::caught(|| step.go_on())? {
+                    Err(why) => break Err(why),
+                    Ok(report) => {
+                        step.look(|view| show(update, &Inside { view, logger }));
+                        if let Some(report) = report {
+                            break Ok(report);
+                        }
+                    }
+                }
+            },
+        };
+        guard::caught(|| common.answer(call, modes::ERROR, |i| i.conclude(stepped)))
+    }
+}
+
 /// An instance made through the FMI 2.0 functions.
 pub(super) struct Instance2 {
     pub(super) common: Instance,
@@ -579,6 +621,23 @@ pub(super) unsafe fn answered<T: Common>(handle: *mut Handle<T>, body: impl FnOn
         // SAFETY: the caller's promise.
         let _ = unsafe { guard::with(handle, take) };
     }
+    told.tell();
+    outcome.unwrap_or(Status::Error)
+}
+
+/// The same for a body that calls the host in between.
+///
+/// # Safety
+/// As for [`guard::with_callbacks`].
+pub(super) unsafe fn answered_with_callbacks<T: Common>(
+    handle: *mut Handle<T>,
+    body: impl FnOnce(&mut T) -> Result<Status, String>,
+) -> Status {
+    // SAFETY: the caller's promise.
+    let outcome = unsafe { guard::with_callbacks(handle, body) };
+    let mut told = Told::nothing();
+    // SAFETY: the caller's promise.
+    let _ = unsafe { guard::with(handle, |i| told = i.common().logger.take()) };
     told.tell();
     outcome.unwrap_or(Status::Error)
 }

@@ -358,7 +358,14 @@ impl SceneFile {
 /// What the parser says of `text`, with line and column.
 pub(super) fn slip(text: &str, error: &toml::de::Error) -> SceneError {
     let at = error.span().map_or(0, |span| span.start);
-    Text(text).at(at, plain(&lacking(text, at, error.message())))
+    let message = plain(&lacking(text, at, error.message()));
+    // A value that is none of its key's: which key that is stands before it.
+    let before = text[..at.min(text.len())].rsplit('\n').next().unwrap_or_default();
+    let key = before.rsplit_once('=').map(|(key, _)| key.rsplit(['{', ',']).next().unwrap_or_default().trim());
+    match key.filter(|key| !key.is_empty() && message.starts_with("found ")) {
+        Some(key) => Text(text).at(at, format!("`{key}`: {message}")),
+        None => Text(text).at(at, message),
+    }
 }
 
 /// Where `message` misses a key, the same with the table that lacks it: the one whose heading stands at `at`.
@@ -376,7 +383,9 @@ fn lacking(text: &str, at: usize, message: &str) -> String {
 
 /// The message of the parser in words of a scene instead of those of the program's types.
 fn plain(message: &str) -> String {
-    const WORDS: [(&str, &str); 18] = [
+    const WORDS: [(&str, &str); 20] = [
+        ("invalid value: integer ", "found the whole number "),
+        ("invalid value: ", "found "),
         ("unknown field ", "unknown key "),
         ("missing field ", "missing key "),
         ("invalid type: map, expected a sequence", "found one table, wanted an array of tables: [[name]]"),

@@ -2,7 +2,7 @@
 
 use super::outputs::Read;
 use super::ports::Source;
-use super::step::{bone_of_input, read_pivots};
+use super::targets::{bone_of_input, read_pivots};
 use super::{Model, Sim, SimError, State};
 use crate::fem::{At, Strain, Touch};
 use crate::math::{Mat3, Vec3, left_jacobian, log_rotation};

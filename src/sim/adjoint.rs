@@ -18,7 +18,8 @@ use super::derivative::{
 use super::model::{Drive, Model};
 use super::outputs::Slope;
 use super::past::{Origin, Past};
-use super::step::{complete, read_pivots};
+use super::step::complete;
+use super::targets::read_pivots;
 use super::{Sim, SimError};
 use crate::fem::{At, Configuration};
 use crate::math::{Mat3, Pose, Vec3, left_jacobian, log_rotation};

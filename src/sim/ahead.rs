@@ -9,8 +9,8 @@ use std::thread::{Builder, JoinHandle};
 
 use super::linearisation::{Linearisation, with_problem};
 use super::model::Model;
+use super::report::StepReport;
 use super::state::Upcoming;
-use super::step::StepReport;
 use super::{SolveError, State};
 use crate::solve::Minimiser;
 

@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::model::{Contact, Drive, Model};
 use super::pace::even_part;
-use super::step::place_bones;
+use super::targets::place_bones;
 use crate::fem::{At, Configuration};
 use crate::math::Vec3;
 use crate::mesh::signed_volume;

@@ -1,8 +1,9 @@
 //! What an accepted or refused step must not hide: where tissue is worst, whether it snapped, whether it came back.
 
 use super::model::Model;
+use super::report::StepReport;
 use super::state::{State, are_at_rest};
-use crate::fem::{At, Term};
+use crate::fem::{At, Strain, Term};
 use crate::math::Vec3;
 use crate::mesh::signed_volume;
 
@@ -12,6 +13,8 @@ const SQUEEZED: f64 = 0.1;
 const SMALL_STRAIN: f64 = 0.4;
 /// Growth of that bound after which the elements of a table are looked at again.
 const LOOK_AGAIN: f64 = 2.0;
+/// A jump across a bone-to-bone edge larger than this part of its length is reported.
+const LARGEST_JUMP: f64 = 0.3;
 /// Share of the elastic energy whose loss nothing explains that is a snap.
 const SNAP: f64 = 0.5;
 /// Motion of a snap in sizes of the tissue; less may be round-off that settles.
@@ -199,4 +202,43 @@ pub(super) fn folds(terms: &[Box<dyn Term>], X: &[Vec3], inputs: &[f64], n_histo
     let history = vec![0.0; n_history];
     let at = At { inputs, history: &history, x_tilde: X, x_lag: &mirrored, ..At::NOWHERE };
     terms.iter().any(|t| t.min_det_f(&mirrored) < 0.0 && t.energy(&at, &mirrored).is_finite())
+}
+
+/// The largest jump of displacement across a bone-to-bone edge, in lengths of the edge.
+pub(super) fn worst_jump(model: &Model, x: &[Vec3]) -> Option<(f64, u32, u32)> {
+    let X = &model.mesh().nodes;
+    let jump = |&(a, b): &(u32, u32)| {
+        let (i, j) = (a as usize, b as usize);
+        (((x[i] - X[i]) - (x[j] - X[j])).norm() / (X[i] - X[j]).norm(), a, b)
+    };
+    model.osteotomy().iter().map(jump).max_by(|p, q| p.0.total_cmp(&q.0))
+}
+
+/// Tells of bones that moved apart across a single element.
+pub(super) fn warn_of_jumps(
+    model: &Model,
+    before: Option<(f64, u32, u32)>,
+    after: Option<(f64, u32, u32)>,
+    report: &mut StepReport,
+) {
+    let (Some((before, ..)), Some((ratio, a, b))) = (before, after) else { return };
+    if ratio > LARGEST_JUMP && before <= LARGEST_JUMP {
+        let x = model.mesh().nodes[a as usize];
+        report.warnings.push(format!(
+            "bones move apart by {ratio:.2} of the edge between nodes {a} and {b} at ({:.4}, {:.4}, {:.4}) m: forces and \
+             the skin there depend on the mesh; release the line with [attachment] free_rings = 1",
+            x.x, x.y, x.z
+        ));
+    }
+}
+
+/// Strain and energy of an accepted state, all of whose nodes are at `x`.
+pub(super) fn strain(model: &Model, state: &State, x: &[Vec3]) -> Strain {
+    let at = At { t: state.t, dt: state.outputs.dt, inputs: &state.applied, history: &state.history, ..At::NOWHERE };
+    strain_at(model, &at, x)
+}
+
+/// The same where terms see `at`.
+pub(super) fn strain_at(model: &Model, at: &At, x: &[Vec3]) -> Strain {
+    model.parts().terms.iter().fold(Strain::NONE, |s, t| s.and(t.strain(at, x)))
 }

@@ -16,11 +16,12 @@
 
 use std::ops::Range;
 
+use super::audit::strain_at;
 use super::linearisation::with_problem;
 use super::outputs::Slope;
 use super::past::{Origin, Past};
 use super::ports::Source;
-use super::step::{place_bones, read_pivots, read_wrenches, strain_at, target_increments};
+use super::targets::{place_bones, read_pivots, read_wrenches, target_increments};
 use super::{Model, Sim, SimError, SolveError, State};
 use crate::fem::Configuration;
 use crate::math::{Vec3, left_jacobian, log_rotation};

@@ -15,7 +15,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::SolveError;
 use super::model::{Drive, Model};
-use super::step::{read_pivots, target};
+use super::targets::{read_pivots, target};
 use crate::fem::{At, Configuration, Role};
 use crate::math::lane::{BATCH, Lane, Real};
 use crate::math::{Mat3, Pose, Vec3};

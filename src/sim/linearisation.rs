@@ -1,7 +1,8 @@
 //! Where and how a stiffness was factored. Part of the state, so that a restored simulation repeats its bits.
 
 use super::model::Model;
-use super::step::{in_time, read_pivots, read_wrenches};
+use super::motion::in_time;
+use super::targets::{read_pivots, read_wrenches};
 use crate::fem::{At, Configuration};
 use crate::math::Vec3;
 use crate::solve::Problem;

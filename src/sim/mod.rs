@@ -17,15 +17,20 @@ mod motion;
 mod outputs;
 mod pace;
 mod past;
+mod piece;
+mod pieces;
 mod ports;
 mod recover;
 mod replay;
+mod report;
 mod scheme;
 mod skin;
 mod start;
 mod state;
 mod step;
 mod swing;
+mod targets;
+mod workspace;
 
 pub use access::View;
 pub use audit::{Place, worst_tets};
@@ -36,10 +41,10 @@ pub use model::{
 pub use modes::Spectrum;
 pub use ports::Layout;
 pub(crate) use ports::MOST_TUNABLE;
+pub use report::StepReport;
 pub use scheme::Scheme;
 pub use skin::Skin;
 pub use state::{State, StateError};
-pub use step::StepReport;
 pub(crate) use swing::undamped;
 
 use std::sync::{Arc, OnceLock};
@@ -205,7 +210,7 @@ pub enum SimError {
 pub struct Sim {
     model: Arc<Model>,
     state: State,
-    work: step::Workspace,
+    work: workspace::Workspace,
     /// Strain of the accepted state, once somebody asked for it.
     strain: OnceLock<Strain>,
     /// All nodes where the state holds only those that ports read, once somebody asked for them.
@@ -221,7 +226,7 @@ impl Sim {
     /// [`SimError::Setup`] for a model whose factor would not fit into memory.
     pub fn new(model: Arc<Model>) -> Result<Sim, SimError> {
         let state = State::start(&model);
-        let work = step::Workspace::new(&model)?;
+        let work = workspace::Workspace::new(&model)?;
         Ok(Sim { model, state, work, strain: OnceLock::new(), whole: OnceLock::new(), sensitivity: None })
     }
 
@@ -294,9 +299,22 @@ impl Sim {
             return Err(SimError::StepLength(dt));
         }
         self.work.allowance.grant(self.state.most_solves);
-        let report = step::advance(&self.model, &mut self.state, &mut self.work, dt, None)?;
+        let report = step::advance(&self.model, &mut self.state, &mut self.work, dt)?;
         self.forget();
         Ok(report)
+    }
+
+    /// Begins the same step, to be gone on with piece by piece; dropped before its end it has changed nothing.
+    ///
+    /// # Errors
+    /// As for [`Sim::step`].
+    pub fn begin(&mut self, dt: f64) -> Result<Step<'_>, SimError> {
+        if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
+            return Err(SimError::StepLength(dt));
+        }
+        self.work.allowance.grant(self.state.most_solves);
+        let begun = step::begin(&self.model, &mut self.state, &mut self.work, dt)?;
+        Ok(Step { sim: self, begun: Some(begun), piece: None })
     }
 
     /// The same; `watch` sees every piece of the step as soon as it is accepted. Pieces before one that fails are taken back.
@@ -304,19 +322,14 @@ impl Sim {
     /// # Errors
     /// As for [`Sim::step`].
     pub fn step_watched(&mut self, dt: f64, watch: &mut dyn FnMut(&View)) -> Result<StepReport, SimError> {
-        if !(SHORTEST_STEP..=LONGEST_STEP).contains(&dt) {
-            return Err(SimError::StepLength(dt));
+        let mut step = self.begin(dt)?;
+        loop {
+            let report = step.go_on()?;
+            step.look(|view| watch(view));
+            if let Some(report) = report {
+                return Ok(report);
+            }
         }
-        let model = self.model.clone();
-        let mut piece = |state: &State| {
-            let strain = || step::strain(&model, state, &state.config.x);
-            watch(&View { model: &model, state, strain: &strain });
-        };
-        self.work.allowance.grant(self.state.most_solves);
-        let report = step::advance(&model, &mut self.state, &mut self.work, dt, Some(&mut piece))?;
-        self.forget();
-        watch(&self.view(&|| self.strain()));
-        Ok(report)
     }
 
     /// How much the elements were strained by the last accepted step; found when first asked for.
@@ -324,7 +337,7 @@ impl Sim {
         if !self.state.outputs.converged {
             return Strain { min_det_f: 1.0, max_stretch: 1.0, energy: 0.0 };
         }
-        *self.strain.get_or_init(|| step::strain(&self.model, &self.state, self.positions()))
+        *self.strain.get_or_init(|| audit::strain(&self.model, &self.state, self.positions()))
     }
 
     /// Drops what was found out about the state before.
@@ -426,5 +439,52 @@ impl Sim {
     /// Stored entries of the stiffness matrix's factor (8 bytes each).
     pub fn factor_len(&self) -> usize {
         self.work.minimiser().factor_len()
+    }
+}
+
+/// A step of a simulation under way.
+pub struct Step<'a> {
+    sim: &'a mut Sim,
+    /// What there is to go on with.
+    begun: Option<step::Begun>,
+    /// Where the last piece ended, if the step did not end with it.
+    piece: Option<Box<State>>,
+}
+
+impl Step<'_> {
+    /// Goes on to the end of the next piece; the report once that is the end of the step.
+    ///
+    /// # Errors
+    /// As for [`Sim::step`]; there is no way on then.
+    ///
+    /// # Panics
+    /// After the end of the step, or an error.
+    pub fn go_on(&mut self) -> Result<Option<StepReport>, SimError> {
+        let Sim { model, state, work, .. } = &mut *self.sim;
+        let report = match self.begun.take().expect("the step goes on") {
+            step::Begun::Done(report) => report,
+            step::Begun::Running(mut run) => match run.go_on(model, state, work, true)? {
+                pieces::Progress::Done(report) => report,
+                pieces::Progress::Piece(piece) => {
+                    (self.begun, self.piece) = (Some(step::Begun::Running(run)), Some(piece));
+                    return Ok(None);
+                }
+            },
+        };
+        self.piece = None;
+        self.sim.forget();
+        Ok(Some(report))
+    }
+
+    /// Shows where the last piece ended.
+    pub fn look(&self, watch: impl FnOnce(&View)) {
+        let model = &self.sim.model;
+        match &self.piece {
+            Some(state) => {
+                let strain = || audit::strain(model, state, &state.config.x);
+                watch(&View { model, state, strain: &strain });
+            }
+            None => watch(&self.sim.view(&|| self.sim.strain())),
+        }
     }
 }

@@ -19,12 +19,14 @@
 
 use nalgebra::DMatrix;
 
+use super::audit::{warn_of_jumps, worst_jump};
 use super::linear_map::{Cause, causes};
 use super::model::Model;
 use super::modes::{Modal, Spectrum, bone_of};
+use super::report::StepReport;
 use super::scheme::{Past, Scheme};
 use super::state::State;
-use super::step::{StepReport, place_bones, read_pivots, target, warn_of_jumps, worst_jump};
+use super::targets::{place_bones, read_pivots, target};
 use super::{SimError, SolveError};
 use crate::math::Vec3;
 use crate::solve::Minimiser;

@@ -1,9 +1,9 @@
 //! What inertia knows of the steps before, and how it is carried on by a scheme.
 
-use super::model::Inertia;
+use super::model::{Inertia, Model};
 use super::scheme::{Formula, Past};
 use super::swing::Free;
-use crate::fem::{Configuration, Dofs, Role};
+use crate::fem::{At, Configuration, Dofs, Role};
 use crate::math::Vec3;
 
 /// Velocities and what the scheme remembers; every list is empty in quasi-static scenes.
@@ -91,5 +91,17 @@ impl Motion {
     pub fn past(&self, a: usize, x: &[Vec3]) -> Past {
         let memory = self.memory.get(a).copied().unwrap_or([Vec3::zeros(); 2]);
         Past { x: x[a], v: self.v[a], memory }
+    }
+}
+
+/// `at` with the coefficients of the scene's scheme, after a piece of `dt_before`.
+pub(super) fn in_time<'a>(model: &Model, at: At<'a>, dt_before: f64) -> At<'a> {
+    match &model.parts().inertia {
+        Some(i) if at.dt > 0.0 => At {
+            inertia: i.scheme.formula(at.dt, dt_before).coefficient(i.damping_mass),
+            difference: i.scheme.difference(at.dt, dt_before),
+            ..at
+        },
+        _ => at,
     }
 }

@@ -3,10 +3,24 @@
 use std::sync::Arc;
 
 use super::modal::{Coordinates, Last};
-use super::step::{Piece, Workspace, in_time};
+use super::motion::in_time;
+use super::workspace::Workspace;
 use super::{Model, SimError, State};
 use crate::fem::{At, Dofs, Role};
 use crate::math::Vec3;
+
+/// A piece of time that was accepted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Piece {
+    /// Its number among those that were kept; 0 before.
+    pub number: u64,
+    /// Its end, s.
+    pub t: f64,
+    /// Its length, s; 0 if no time passed.
+    pub dt: f64,
+    /// Length of the one before, s; 0 if there was none.
+    pub dt_before: f64,
+}
 
 /// What came before a state, as its snapshot carries it.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,10 +3,12 @@
 //! The step is affine in all inputs but turns, so central differences are good to nine digits; the adjoint asks for one input
 //! after another.
 
+use super::audit::strain;
 use super::modal::{self, Last};
 use super::modes::Modal;
 use super::past::unknown;
-use super::step::{Workspace, complete, strain};
+use super::step::complete;
+use super::workspace::Workspace;
 use super::{Model, Sim, SimError, State, View};
 
 /// Largest change of an input in a difference, in its SI unit.

@@ -102,7 +102,7 @@ fn a_hosts_floating_point_environment_changes_nothing() {
 }
 
 #[test]
-fn log_callbacks_may_throw() {
+fn callbacks_may_throw() {
     let said = build_and_run("c++", "-std=c++17", &root().join("tests/c/throws.cpp"), false);
     assert!(said.contains("throws: all is well"), "{said}");
 }
