@@ -100,7 +100,8 @@ uint32_t cutis_abi(void);
 // A simulation of the scene file at `path` (UTF-8), at rest at t = 0 s; the mesh it names lies relative to it.
 //
 // Returns NULL on failure; the reason is then in `why`, cut to `why_len` bytes with its closing zero. `why` may be NULL.
-// Free with cutis_sim_free.
+// A factor or a volume that the machine has no memory for is such a failure, with the bytes wanted; what else runs out of memory
+// aborts the process (see CutisSim). Free with cutis_sim_free.
 //
 // # Safety
 // `path` is NULL or a zero-terminated string; `why` is NULL or holds `why_len` bytes.
@@ -112,7 +113,8 @@ struct CutisSim *cutis_sim_new_from_file(const char *path,
 // `folder`, or to the working folder where `folder` is NULL.
 //
 // Returns NULL on failure; the reason is then in `why`, cut to `why_len` bytes with its closing zero. `why` may be NULL.
-// Free with cutis_sim_free.
+// A factor or a volume that the machine has no memory for is such a failure, with the bytes wanted; what else runs out of memory
+// aborts the process (see CutisSim). Free with cutis_sim_free.
 //
 // # Safety
 // `scene` and `folder` are NULL or zero-terminated strings; `why` is NULL or holds `why_len` bytes.
@@ -126,7 +128,8 @@ struct CutisSim *cutis_sim_new_from_text(const char *scene,
 // file is read.
 //
 // Returns NULL on failure; the reason is then in `why`, cut to `why_len` bytes with its closing zero. `why` may be NULL.
-// Free with cutis_sim_free.
+// A factor or a volume that the machine has no memory for is such a failure, with the bytes wanted; what else runs out of memory
+// aborts the process (see CutisSim). Free with cutis_sim_free.
 //
 // # Safety
 // `scene` is NULL or a zero-terminated string; `mesh` is NULL or holds `len` bytes; `why` is NULL or holds `why_len` bytes.
@@ -139,7 +142,8 @@ struct CutisSim *cutis_sim_new_from_baked(const char *scene,
 // A simulation of the scene inside the library, a synthetic head, at rest at t = 0 s. No file is read.
 //
 // Returns NULL on failure; the reason is then in `why`, cut to `why_len` bytes with its closing zero. `why` may be NULL.
-// Free with cutis_sim_free.
+// A factor or a volume that the machine has no memory for is such a failure, with the bytes wanted; what else runs out of memory
+// aborts the process (see CutisSim). Free with cutis_sim_free.
 //
 // # Safety
 // `why` is NULL or holds `why_len` bytes.

@@ -118,6 +118,16 @@ struct Each<'a> {
     shift: f64,
 }
 
+/// Whether the machine gives the memory for `n` samples; asked for at once and let go, since vectors that do not fit end the process.
+pub(super) fn room(path: &Path, n: usize) -> Result<(), IoError> {
+    let bytes = n.saturating_mul(size_of::<f32>());
+    Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| {
+        let advice =
+            format!("they want {bytes} bytes of memory, which the machine does not give; crop or resample the volume");
+        IoError::unsupported(path, format!("{n} samples"), advice)
+    })
+}
+
 impl Each<'_> {
     fn read<const N: usize>(&self, value: impl Fn([u8; N]) -> f64) -> Vec<f32> {
         let turn = |mut b: [u8; N]| {

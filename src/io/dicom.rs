@@ -148,6 +148,7 @@ impl Pile {
         // Pixel spacing names the distance of rows first: that is the step down a column.
         let axes = [first.row * first.spacing[1], first.column * first.spacing[0], step];
         let grid = ct::grid(folder, dims, axes, first.origin)?;
+        ct::room(folder, grid.len())?;
         let samples = slices.into_iter().flat_map(|s| s.samples).collect();
         ct::volume(folder, grid, samples)
     }

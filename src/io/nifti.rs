@@ -59,6 +59,7 @@ pub(super) fn read(path: &Path, told: &mut Vec<String>) -> Result<Volume, IoErro
             return Err(IoError::format(path, place, format!("{found:?}"), "finite numbers"));
         }
     };
+    ct::room(path, grid.len())?;
     let samples = scalar.scaled(&data[offset as usize..wanted as usize], header.little, slope, shift);
     ct::volume(path, grid, samples)
 }

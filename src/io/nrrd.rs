@@ -91,7 +91,9 @@ pub(super) fn read(path: &Path, told: &mut Vec<String>) -> Result<Volume, IoErro
     let one = wanted / files.count();
     let binary = |unpack: &mut Unpack| {
         let little = header.little(scalar)?;
-        Ok::<_, IoError>(scalar.decode(&files.gather(path, wanted, unpack)?, little))
+        let bytes = files.gather(path, wanted, unpack)?;
+        ct::room(path, grid.len())?;
+        Ok::<_, IoError>(scalar.decode(&bytes, little))
     };
     let samples = match encoding.as_str() {
         "raw" => binary(&mut |file, data| skip.bytes(file, skip.lines(file, data)?, one, &files, told))?,

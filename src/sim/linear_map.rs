@@ -316,7 +316,7 @@ impl LinearMap {
             return Ok(None);
         };
         let table = 3 * model.mesh().nodes.len() * (causes.len() + 1) * size_of::<f64>();
-        if table > minimiser.memory().max(SMALL) {
+        if table > minimiser.memory().max(SMALL) || Vec::<u8>::new().try_reserve_exact(table).is_err() {
             return Ok(None);
         }
         let mut builder = Builder::new(model, minimiser, inputs)?;

@@ -93,7 +93,7 @@ pub enum SimError {
     StepLength(f64),
     /// The table of a scene in modes would be too large.
     #[error(
-        "{columns} inputs and modes would fill a table of {bytes} bytes, the limit is {limit}: take fewer `modes` of \
+        "{columns} inputs and modes would fill a table of {bytes} bytes, the limit is {limit} and what the machine gives: take fewer `modes` of \
          [inertia], drive bones by pose instead of node by node, or leave `modes` out"
     )]
     TooManyModes {

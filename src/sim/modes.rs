@@ -141,7 +141,7 @@ impl Modal {
         let (dofs, X, n_modes) = (model.dofs(), &parts.mesh.nodes, reduction.modes);
         let columns = causes.len() + n_modes;
         let bytes = 3 * X.len() * (columns + 1) * size_of::<f64>();
-        if bytes > MOST_BYTES {
+        if bytes > MOST_BYTES || Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
             return Err(SimError::TooManyModes { columns, bytes, limit: MOST_BYTES });
         }
         let m: Vec<f64> = dofs.free.iter().map(|&a| inertia.m[a as usize]).collect();
