@@ -23,12 +23,13 @@ use crate::fem::At;
 use crate::math::{Pose, Vec3};
 use crate::solve::Problem;
 
-/// A step that is begun.
+/// A step that is begun; on the stack, since a step allocates nothing.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum Begun {
     /// It needed no solver of its own, and is done.
     Done(StepReport),
     /// It goes on piece by piece.
-    Running(Box<Run>),
+    Running(Run),
 }
 
 /// Begins to move `state` on by `dt` seconds: by a way that is exact where the scene has one, else piece by piece.
@@ -48,7 +49,7 @@ pub(super) fn begin(model: &Arc<Model>, state: &mut State, work: &mut Workspace,
         return Ok(Begun::Done(report));
     }
     let most = most_work(model, state, work);
-    Ok(Begun::Running(Box::new(Run::begin(model, state, work, dt, most))))
+    Ok(Begun::Running(Run::begin(model, state, work, dt, most)))
 }
 
 /// Moves `state` on by `dt` seconds, or leaves it as it is.
