@@ -5,7 +5,7 @@ use super::cubes::Cubes;
 use super::fit::Fit;
 use super::median::Median;
 use super::seam::Seam;
-use super::split::{FRONT, Split};
+use super::split::{Cube, FRONT, Split};
 use super::template::{HEAD, Part, core};
 use crate::math::Vec3;
 
@@ -63,6 +63,8 @@ const RIM: f64 = 3.0;
 /// Joints lie beside, behind and above these, template's |x|, y, z, mm; teeth lie before this.
 const JOINT: [f64; 3] = [30.0, -16.0, -18.0];
 const TEETH: f64 = -24.0;
+/// Below this the scan must hold the mandible whole, template's z, mm: over it only the hinge is lost.
+const BELOW: f64 = -25.0;
 
 /// What is checked.
 pub(super) struct Checked<'a> {
@@ -83,8 +85,8 @@ impl Checked<'_> {
         let least = |limit: f64| [limit, f64::INFINITY];
         let ml = self.hu.h.powi(3) * 1e-3;
         let placed = &self.fit.placed;
-        let jaw: Vec<_> = self.split.cubes.iter().filter(|c| self.split.map[c.at] == MANDIBLE).collect();
-        let count = |pass: &dyn Fn(&&&super::split::Cube) -> bool| jaw.iter().filter(|c| pass(c)).count() as f64;
+        let jaw: Vec<&Cube> = self.split.cubes.iter().filter(|c| self.split.map[c.at] == MANDIBLE).collect();
+        let count = |pass: &dyn Fn(&&&Cube) -> bool| jaw.iter().filter(|c| pass(c)).count() as f64;
         let n = jaw.len().max(1) as f64;
         let left =
             count(&|c| (self.hu.place(c.at) - self.median.offset * self.median.normal).dot(&self.median.normal) > 0.0);
@@ -92,7 +94,7 @@ impl Checked<'_> {
         let [body, ramus, condyle] = self.found();
         let [joint, elsewhere] = self.contact();
         let mut checks = vec![
-            bones("the likeness of the bone to a mandible", self.fit.score, least(0.63), ""),
+            bones("the likeness of the bone to a mandible", self.fit.score, least(0.6), ""),
             bones("the share of the mandible's body that was found", body, least(0.8), ""),
             bones("the share of its rami that was found", ramus, least(0.75), ""),
             bones(
@@ -103,9 +105,10 @@ impl Checked<'_> {
             ),
             bones("its difference between left and right", (2.0 * left / n - 1.0).abs(), most(0.16), ""),
             bones("what it has above the teeth", count(&|c| c.x.y < FRONT && c.over > 4.0) * ml, most(1.5), "mL"),
-            bones("the share of it that lies off its place", far / n, most(0.03), ""),
-            bones("its contact with the skull in the joints", joint, most(9.0), "cm2"),
-            bones("its contact with the skull elsewhere", elsewhere, most(2.5), "cm2"),
+            bones("the share of it that lies off its place", far / n, most(0.04), ""),
+            bones("what of it the end of the scan cuts off below the joints", self.cut_off(&jaw), most(16.0), "cm2"),
+            bones("its contact with the skull in the joints", joint, most(11.0), "cm2"),
+            bones("its contact with the skull elsewhere", elsewhere, most(5.5), "cm2"),
         ];
         let bite = |what, value, limits, unit| Check { what, value, limits, unit, about: About::Bite };
         checks.push(bite("what stands in the way between upper and lower teeth", self.seam.cost, most(100.0), "HU"));
@@ -171,6 +174,17 @@ impl Checked<'_> {
             side[1] += usize::from(near);
         }
         found.map(|sides| sides.iter().map(|[n, near]| *near as f64 / (*n).max(1) as f64).fold(1.0, f64::min))
+    }
+
+    /// Area of body and lower ramus on the faces of the field, cm2.
+    fn cut_off(&self, jaw: &[&Cube]) -> f64 {
+        let [nx, ny, nz] = self.hu.grid.dims;
+        let faces = |c: &Cube| {
+            let at = [(c.at % nx, nx), (c.at / nx % ny, ny), (c.at / (nx * ny), nz)];
+            at.iter().filter(|(i, n)| *i == 0 || i + 1 == *n).count()
+        };
+        let below = jaw.iter().filter(|c| c.x.z < BELOW);
+        below.map(|c| faces(c) as f64).sum::<f64>() * self.hu.h.powi(2) * 1e-2
     }
 
     /// Area of mandible against skull and spine in the joints, and elsewhere but between the teeth, cm2.

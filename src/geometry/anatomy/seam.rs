@@ -14,6 +14,8 @@ const HEIGHTS: usize = 50;
 const ACROSS: [f64; 6] = [-5.0, -3.0, -1.0, 1.0, 3.0, 5.0];
 /// Below this all is alike, HU: air before the incisors must not draw the seam.
 const CLIP: [f64; 2] = [50.0, 1800.0];
+/// Density above 200 HU beyond which more counts a tenth: where crowns touch, the seam must not leave them for the bone beyond.
+const DENSE: f64 = 600.0;
 /// Reach in which crowns are sought above and below, mm.
 const CROWN: usize = 8;
 /// Height that is usual in front, mm above the crest.
@@ -69,7 +71,8 @@ pub(super) fn seam(hu: &Cubes, placed: &Placed) -> Seam {
         let d = |k: usize| density[i * HEIGHTS + k];
         let up = (k..=(k + CROWN).min(HEIGHTS - 1)).map(d).fold(0.0, f64::max);
         let down = (k.saturating_sub(CROWN)..=k).map(d).fold(0.0, f64::max);
-        (d(k) - 200.0).clamp(0.0, 1200.0) - 0.12 * up.min(down).min(1200.0) - 0.04 * (up + down).min(2400.0)
+        let own = (d(k) - 200.0).max(0.0);
+        own.min(DENSE) + 0.1 * (own - DENSE).max(0.0) - 0.12 * up.min(down).min(1200.0) - 0.04 * (up + down).min(2400.0)
     };
     let costs: Vec<f64> = (0..n).flat_map(|i| (0..HEIGHTS).map(move |k| (i, k))).map(|(i, k)| cost(i, k)).collect();
     let plane = plane(&costs, &stations);
