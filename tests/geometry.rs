@@ -2,6 +2,7 @@
 mod geometry {
     mod anatomy;
     mod bake;
+    mod bake_command;
     mod block;
     mod ct_files;
     mod dicom_files;

@@ -40,6 +40,9 @@ pub struct Bake {
     /// Right and left condyle in mm (LPS), where they are not found
     #[arg(long, num_args = 6, allow_negative_numbers = true, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"])]
     hinge: Option<Vec<f64>>,
+    /// Right and left corner of the mouth in mm (LPS), where they are not found
+    #[arg(long, num_args = 6, allow_negative_numbers = true, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"])]
+    commissures: Option<Vec<f64>>,
     /// Plane where the teeth meet, where it is not found: a point in mm (LPS) and the normal
     #[arg(long, num_args = 6, allow_negative_numbers = true, value_names = ["X", "Y", "Z", "NX", "NY", "NZ"])]
     occlusal: Option<Vec<f64>>,
@@ -145,6 +148,11 @@ impl Bake {
         if let Some((bone, _)) = seeds.iter().find(|(_, p)| p.iter().any(|v| !v.is_finite())) {
             return Err(format!("--seed {bone} takes three finite numbers in mm").into());
         }
+        for (option, hu) in [("skin", self.skin.or(file.skin)), ("bone", self.bone.or(file.bone))] {
+            if let Some(hu) = hu.filter(|hu| !hu.is_finite()) {
+                return Err(format!("the threshold {option} takes a finite number in HU; found {hu}").into());
+            }
+        }
         Ok(BakeOptions {
             skin_hu: self.skin.or(file.skin).unwrap_or(usual.skin_hu),
             bone_hu: self.bone.or(file.bone).unwrap_or(usual.bone_hu),
@@ -154,6 +162,7 @@ impl Bake {
             mouth: places("--mouth", &self.mouth, file.mouth)?,
             hints: Hints {
                 hinge: places("--hinge", &self.hinge, file.hinge)?,
+                commissures: places("--commissures", &self.commissures, file.commissures)?,
                 occlusal: occlusal.map(|[point, normal]| [point, normal.normalize()]),
                 seeds,
             },

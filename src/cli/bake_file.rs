@@ -38,6 +38,7 @@ pub struct BakeFile {
     pub region: Option<[Place; 2]>,
     pub mouth: Option<[Place; 2]>,
     pub hinge: Option<[Place; 2]>,
+    pub commissures: Option<[Place; 2]>,
     pub occlusal: Option<Occlusal>,
     #[serde(default)]
     pub seeds: BTreeMap<String, Vec<Place>>,

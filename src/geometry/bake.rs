@@ -30,6 +30,8 @@ const PASSAGE: f64 = 3e-3;
 /// Search reach for the nearest bone, m.
 const REACH: f64 = 0.06;
 
+/// Where the foremost skin is further than this from the tip of the nose, the head is turned, m.
+const TURNED: f64 = 0.02;
 /// Search reach for a second bone, m: beyond the crowns of the teeth.
 const NEAR: f64 = 0.013;
 
@@ -124,14 +126,15 @@ pub fn bake(
         return Err(MeshingError::Thresholds { skin: options.skin_hu, bone: options.bone_hu });
     }
     let volume = &*volume.upright();
-    let nose = nose_tip(volume, options)?;
+    let foremost = nose_tip(volume, options)?;
+    progress("anatomy", 0.01);
+    let found = Found::of(volume, labels, options)?;
+    let nose = found.nose.filter(|n| (n - foremost).norm() > TURNED).unwrap_or(foremost);
     let region = region(volume, options, &nose)?;
     let mut warnings = match labels {
         Some(labels) => usable(labels, volume, options.bone_hu, &region)?,
         None => Vec::new(),
     };
-    progress("anatomy", 0.02);
-    let found = Found::of(volume, labels, options)?;
     warnings.extend(found.warnings);
     let mut part = part_of(volume, &region);
     progress("surfaces", 0.1);
@@ -177,7 +180,7 @@ pub fn bake(
     let stuffing = stuff(&walls, &lattice)?;
     let repair = stuffing.repair;
     progress("names", 0.7);
-    let mouth = mouth(options, &bone_surfaces, &nose, told);
+    let mouth = mouth(options, &bone_surfaces, &nose, found.commissures, told);
     let parts = |c: [Vec3; 3], a: Vec3, b: Vec3| {
         let side = |p: &Vec3| to[1](p) < to[0](p);
         let middle = (c[0] + c[1] + c[2]) / 3.0;
@@ -236,19 +239,23 @@ struct Found {
     trusted: bool,
     checks: Vec<Check>,
     condyles: Option<[Vec3; 2]>,
+    /// Right and left corner of the mouth.
+    commissures: Option<[Vec3; 2]>,
+    nose: Option<Vec3>,
     warnings: Vec<Warning>,
 }
 
 impl Found {
     /// Labels given are kept, whatever the checks say of them; labels found are dropped if one fails.
     fn of(volume: &Volume, labels: Option<&Labels>, options: &BakeOptions) -> Result<Self, MeshingError> {
+        seeds_on_bone(volume, labels.is_some(), options)?;
         let found = anatomy(volume, labels, [options.skin_hu, options.bone_hu], &options.hints);
         let failed = |about| found.iter().flat_map(move |a| a.doubts(about)).cloned();
         let doubts: Vec<Check> = failed(About::Bones).chain(failed(About::Hinge)).collect();
         if options.strict && !(found.is_some() && doubts.is_empty()) {
             return Err(MeshingError::Doubtful { checks: doubts });
         }
-        let given = labels.is_some();
+        let given = labels.is_some() || options.hints.part_jaws();
         let bones = failed(About::Bones).next().is_none();
         let hinge = (given || bones) && failed(About::Hinge).next().is_none();
         let mut warnings: Vec<Warning> = failed(About::Bones).map(|check| Warning::Bones { check, given }).collect();
@@ -263,10 +270,40 @@ impl Found {
         if bones {
             warnings.extend(failed(About::Bite).map(|check| Warning::Bite { check }));
         }
+        let believed = found.as_ref().filter(|_| given || bones);
+        let mouth_seen = failed(About::Mouth).next().is_none();
+        let seen = believed.filter(|_| mouth_seen).map(|a| a.lips.commissures());
+        let commissures = options.hints.commissures.or(seen);
+        if commissures.is_none() && believed.is_some() && options.slit && options.mouth.is_none() {
+            warnings.extend(failed(About::Mouth).map(|check| Warning::Mouth { check }));
+        }
+        let nose = believed.and_then(|a| a.nose);
         let checks = found.as_ref().map_or(Vec::new(), |a| a.checks.clone());
         let labels = labels.cloned().or(found.map(|a| a.labels));
-        Ok(Self { labels, trusted: given || bones, checks, condyles, warnings })
+        Ok(Self { labels, trusted: given || bones, checks, condyles, commissures, nose, warnings })
     }
+}
+
+/// Refuses seeds that would do nothing.
+fn seeds_on_bone(volume: &Volume, labelled: bool, options: &BakeOptions) -> Result<(), MeshingError> {
+    /// Bone is looked for this far from a seed, in steps of this, m.
+    const REACH: (i32, f64) = (3, 1e-3);
+    for (bone, place) in &options.hints.seeds {
+        let steps = || (-REACH.0..=REACH.0).map(|k| f64::from(k) * REACH.1);
+        let around = || steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| Vec3::new(x, y, z))));
+        let [low, high] = volume.grid.bounds();
+        let inside = (0..3).all(|a| (low[a]..=high[a]).contains(&place[a]));
+        let on_bone = || around().any(|d| volume.sample(&(place + d)) >= options.bone_hu);
+        let why = match () {
+            () if !BONES.contains(&bone.as_str()) => "known are `skull`, `mandible`, `spine` and `hyoid`",
+            () if labelled => "labels are given: mend them instead",
+            () if !inside => "it lies outside of the scan",
+            () if !on_bone() => "no bone is within 3 mm of it",
+            () => continue,
+        };
+        return Err(MeshingError::Seed { bone: bone.clone(), place: (*place).into(), why });
+    }
+    Ok(())
 }
 
 /// The samples of a volume in and round a region.

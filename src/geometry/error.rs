@@ -95,10 +95,20 @@ pub enum MeshingError {
         /// Numbers found, as a list.
         found: String,
     },
+    /// A seed that shows no bone.
+    #[error("the seed of `{bone}` at {place:.4?} m (LPS) does nothing: {why}")]
+    Seed {
+        /// Bone named.
+        bone: String,
+        /// Place, LPS, m.
+        place: [f64; 3],
+        /// What is wrong with it.
+        why: &'static str,
+    },
     /// Bones or a hinge that fail a check, where that is not allowed.
     #[error("the anatomy of the head is doubtful: {}; give --labels, or help with --seed, --hinge and --occlusal", doubts(.checks))]
     Doubtful {
-        /// The checks that fail; none where nothing looks like a mandible.
+        /// The checks that fail; none where there is no bone in the body.
         checks: Vec<Check>,
     },
     /// The finished mesh broke a rule every mesh keeps.
@@ -108,7 +118,7 @@ pub enum MeshingError {
 
 fn doubts(checks: &[Check]) -> String {
     match checks {
-        [] => "nothing in the scan looks like a mandible".into(),
+        [] => "no bone lies in the body that the scan shows".into(),
         checks => checks.iter().map(Check::to_string).collect::<Vec<_>>().join("; "),
     }
 }

@@ -91,8 +91,15 @@ impl Mouth {
     }
 }
 
-/// The mouth: its box given, or about the front teeth, where skull and mandible come nearest near the median plane.
-pub(super) fn mouth(options: &BakeOptions, bones: &[Surface], nose: &Vec3, told: bool) -> Option<Mouth> {
+/// The mouth: its box given, or about the front teeth, where skull and mandible come nearest near the median plane, and from
+/// commissure to commissure.
+pub(super) fn mouth(
+    options: &BakeOptions,
+    bones: &[Surface],
+    nose: &Vec3,
+    commissures: Option<[Vec3; 2]>,
+    told: bool,
+) -> Option<Mouth> {
     if !options.slit || !told {
         return None;
     }
@@ -112,6 +119,8 @@ pub(super) fn mouth(options: &BakeOptions, bones: &[Surface], nose: &Vec3, told:
         return None;
     }
     let back = upper_y.max(lower_y) + MOUTH[2];
-    let low = Vec3::new(nose.x - MOUTH[0], nose.y - 0.02, z - MOUTH[1]);
-    Some(Mouth::of(Cuboid { low, high: Vec3::new(nose.x + MOUTH[0], back, z + MOUTH[1]) }))
+    let [right, left] =
+        commissures.map_or([nose.x - MOUTH[0], nose.x + MOUTH[0]], |[a, b]| [a.x.min(b.x), a.x.max(b.x)]);
+    let low = Vec3::new(right, nose.y - 0.02, z - MOUTH[1]);
+    Some(Mouth::of(Cuboid { low, high: Vec3::new(left, back, z + MOUTH[1]) }))
 }

@@ -41,11 +41,16 @@ pub enum Warning {
     Bones {
         /// What fails.
         check: Check,
-        /// Whether the bones are those of labels that were given.
+        /// Whether the bones are those of labels or seeds that were given.
         given: bool,
     },
     /// The bite is not seen.
     Bite {
+        /// What fails.
+        check: Check,
+    },
+    /// The corners of the mouth are not seen.
+    Mouth {
         /// What fails.
         check: Check,
     },
@@ -108,11 +113,15 @@ impl fmt::Display for Warning {
             Self::Bones { check, given: false } => {
                 write!(f, "the bones that were found are not to be trusted: {check}")
             }
-            Self::Bones { check, given: true } => write!(f, "do the labels fit this head? {check}"),
+            Self::Bones { check, given: true } => write!(f, "do the labels or seeds fit this head? {check}"),
             Self::Bite { check } => write!(
                 f,
                 "where the teeth meet is not seen: {check}; their crowns may belong to the wrong jaw: look at them, or give \
                  --occlusal"
+            ),
+            Self::Mouth { check } => write!(
+                f,
+                "the corners of the mouth are not seen: {check}; taken at 25 mm from the median plane: give --commissures"
             ),
             Self::Hinge { check } => {
                 write!(f, "the hinge of the jaw is not told: {check}; give the two condyles with --hinge")

@@ -1,12 +1,12 @@
 //! Bones, hinge and checks over a family of heads: what is found is right, what cannot be is told.
-use cutis::geometry::Labels;
 use cutis::geometry::anatomy::{About, Anatomy, Hints, anatomy};
+use cutis::geometry::{BakeOptions, Grid, Labels, MeshingError, Volume, Warning, bake};
 use cutis::io::{LabelMap, read_labels, read_volume};
-use cutis::math::Vec3;
+use cutis::math::{Mat3, Vec3};
 
 use super::ct_files::data;
-use super::heads::{Head, MANDIBLE, MM, score, without_islands};
-use super::phantom::{HYOID, Phantom, oblique};
+use super::heads::{Head, MANDIBLE, MM, points, score, without_islands};
+use super::phantom::{HYOID, MOUTH, Phantom, oblique};
 
 const THRESHOLDS: [f64; 2] = [-300.0, 250.0];
 const BONE: f64 = THRESHOLDS[1];
@@ -54,6 +54,8 @@ fn phantoms_come_apart_in_release() {
     right(&head.opened(12.0), "mouth open");
     right(&head.streaked(3, 3), "streaks");
     for (what, phantom) in [
+        ("teeth in contact", Phantom { bite: 0.0, ..plain }),
+        ("teeth in contact, thick slices", Phantom { bite: 0.0, spacing: [1.0, 1.0, 5.0], ..plain }),
         ("joints of 1 mm", Phantom { joint: 1.0, ..plain }),
         ("no teeth", Phantom { teeth: 0, ..plain }),
         ("small", Phantom { size: 0.84, ..plain }),
@@ -75,7 +77,7 @@ fn what_is_not_in_the_field_is_told_in_release() {
     let [low, high] = head.volume.grid.bounds();
     let none = head.cut(Vec3::new(low.x, low.y, -30.0 * MM), high);
     assert!(found(&none, &Hints::default()).is_none_or(|a| !doubts(&a, About::Bones).is_empty()));
-    for top in [-6.0, -14.0] {
+    for top in [-6.0, -10.0, -14.0] {
         let cut = head.cut(low, Vec3::new(high.x, high.y, top * MM));
         let found = found(&cut, &Hints::default()).unwrap();
         assert!(!doubts(&found, About::Hinge).is_empty());
@@ -119,6 +121,108 @@ fn scanned_head_comes_apart_in_release() {
     assert!(score(&below.labels, &cut, BONE).both > 0.98);
     let Some(clean) = scan("cthead_unc_clean.nii.gz") else { return };
     right(&clean, "streaks removed");
+}
+
+/// What a user knows of a head is taken: seeds, bite, hinge; what would do nothing is refused.
+#[test]
+fn hints_are_taken_in_release() {
+    let head = Phantom { bite: 2.0, ..Phantom::default() }.head();
+    let plain = BakeOptions { edge: 9e-3, ..BakeOptions::default() };
+    let with = |hints: Hints| bake(&head.volume, None, &BakeOptions { hints, ..plain.clone() }, &mut |_, _| {});
+    // A seed in the upper jaw's bone claims what it lies in.
+    let place = Vec3::new(46.0, -58.0, -3.0) * MM;
+    let label = |hints: &Hints| found(&head, hints).unwrap().labels.at(&place);
+    let seeds = vec![("spine".to_owned(), place)];
+    assert_eq!((label(&Hints::default()), label(&Hints { seeds, ..Hints::default() })), (2, 4));
+    // A bite given 6 mm too high gives the upper crowns to the mandible.
+    let normal = Vec3::new(0.0, -5.0, 60.0).normalize();
+    let bite = |up: f64| {
+        let occlusal = Some([Vec3::new(0.0, -76.0, -38.0 + up) * MM, normal]);
+        score(&found(&head, &Hints { occlusal, ..Hints::default() }).unwrap().labels, &head, BONE)
+    };
+    let (right, high) = (bite(0.0), bite(6.0));
+    println!("bite given right: {right}; 6 mm too high: {high}");
+    assert!(right.both > 0.99 && high.rest < right.rest - 0.01);
+    let hinge = Some([Vec3::new(-50.0, 1.0, 1.0) * MM, Vec3::new(52.0, 1.0, 1.0) * MM]);
+    assert_eq!(with(Hints { hinge, ..Hints::default() }).unwrap().condyles, hinge);
+    let commissures = Some([Vec3::new(-30.0, -90.0, -38.0) * MM, Vec3::new(28.0, -90.0, -38.0) * MM]);
+    let mouth = with(Hints { commissures, ..Hints::default() }).unwrap().mouth.unwrap();
+    assert_eq!([mouth[0].x, mouth[1].x], [-30.0 * MM, 28.0 * MM]);
+    for (bone, place, why) in [
+        ("mandible", [0.0, -50.0, -60.0], "no bone"),
+        ("mandible", [0.0, 500.0, 0.0], "outside"),
+        ("jaw", [0.0, -76.0, -75.0], "known are"),
+    ] {
+        let seeds = vec![(bone.to_owned(), Vec3::from(place) * MM)];
+        let e = with(Hints { seeds, ..Hints::default() }).unwrap_err();
+        assert!(matches!(e, MeshingError::Seed { .. }) && e.to_string().contains(why), "{e}");
+    }
+}
+
+/// Where no mandible's shape is found, seeds of both jaws tell the bones apart, and a strict baking refuses.
+#[test]
+fn seeds_alone_part_what_looks_like_no_jaw() {
+    let n = 72;
+    let grid = Grid {
+        dims: [n, n, n],
+        spacing: Vec3::repeat(2.0 * MM),
+        origin: Vec3::repeat(-71.0 * MM),
+        direction: Mat3::identity(),
+    };
+    let samples = points(&grid).map(|p| {
+        let p = p / MM;
+        let ball = |c: [f64; 3], r: f64| (p - Vec3::from(c)).norm() - r;
+        let bone = ball([0.0, 10.0, 22.0], 26.0).min(ball([0.0, -10.0, -30.0], 14.0));
+        let skin = ball([0.0, 0.0, 0.0], 64.0);
+        if bone < 0.0 {
+            900.0
+        } else if skin < 0.0 {
+            40.0
+        } else {
+            -1000.0
+        }
+    });
+    let volume = Volume { samples: samples.collect(), grid };
+    let plain = BakeOptions { edge: 9e-3, ..BakeOptions::default() };
+    let run = |options: &BakeOptions| bake(&volume, None, options, &mut |_, _| {});
+    let none = run(&plain).unwrap();
+    assert!(none.warnings.contains(&Warning::JawNotFound) && none.mesh.node_set("mandible").is_none());
+    assert!(matches!(run(&BakeOptions { strict: true, ..plain.clone() }), Err(MeshingError::Doubtful { .. })));
+    let seed = |bone: &str, z: f64, y: f64| (bone.to_owned(), Vec3::new(0.0, y, z) * MM);
+    let hints = Hints { seeds: vec![seed("skull", 22.0, 10.0), seed("mandible", -30.0, -10.0)], ..Hints::default() };
+    let parted = run(&BakeOptions { hints, ..plain }).unwrap();
+    let jaw = parted.mesh.node_set("mandible").unwrap();
+    assert!(jaw.nodes.iter().all(|&a| parted.mesh.nodes[a as usize].z < -10.0 * MM));
+    assert!(parted.warnings.iter().any(|w| matches!(w, Warning::Bones { given: true, .. })));
+}
+
+/// The lips' line from corner to corner, and what is said where there is none.
+#[test]
+fn lips_are_found_in_release() {
+    let phantom = Phantom { spacing: [1.0, 1.0, 1.0], ..Phantom::default() };
+    let head = phantom.head();
+    let found_in = |head: &Head| found(head, &Hints::default()).unwrap();
+    let seen = found_in(&head);
+    assert!(doubts(&seen, About::Mouth).is_empty(), "{:?}", doubts(&seen, About::Mouth));
+    let [right, left] = seen.lips.commissures().map(|c| c / MM);
+    println!("commissures {:.1?} {:.1?}", right.as_slice(), left.as_slice());
+    assert!((right.x + MOUTH).abs() < 1.5 && (left.x - MOUTH).abs() < 1.5);
+    assert!(seen.lips.line.iter().all(|p| (p.z / MM + 38.0).abs() < 1.0));
+    let tip = seen.nose.unwrap() / MM;
+    assert!((tip - Vec3::new(0.0, -114.5, -12.0)).norm() < 2.0, "{tip}");
+    let turned = head.turned(0, 25.0);
+    let seen = found_in(&turned);
+    assert!(doubts(&seen, About::Mouth).is_empty());
+    let wide = (seen.lips.commissures()[1] - seen.lips.commissures()[0]).norm() / MM;
+    assert!((wide - 2.0 * MOUTH).abs() < 3.0, "{wide}");
+    // Lips that nothing parts are not made up.
+    let mut closed = head.clone();
+    for (p, s) in points(&head.volume.grid).zip(&mut closed.volume.samples) {
+        if p.x.abs() < 27.0 * MM && p.y < -82.0 * MM && (p.z + 38.0 * MM).abs() < 2.5 * MM && p.y > -97.0 * MM {
+            *s = 40.0;
+        }
+    }
+    assert!(!doubts(&found_in(&closed), About::Mouth).is_empty());
 }
 
 /// Labels that are wrong are told by the same checks; right ones are not.

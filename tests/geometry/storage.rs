@@ -1,7 +1,7 @@
 //! Region and face of a scan do not depend on how its voxels are stored; labels are taken as they are, or told.
 use cutis::geometry::head::{mandible, skin, skull};
 use cutis::geometry::{BakeOptions, Baked, Grid, Labels, MeshingError, Volume, Warning, bake};
-use cutis::io::{LabelMap, read_labels, read_volume};
+use cutis::io::{LabelMap, read_labels, read_volume, write_labels};
 use cutis::math::{Mat3, Vec3};
 
 use super::mesh_files::fresh;
@@ -47,7 +47,7 @@ fn stored(volume: &Volume, order: [usize; 3], turned: [bool; 3]) -> Volume {
 }
 
 /// As an NRRD file, in RAS or LPS.
-fn write(volume: &Volume, name: &str, ras: bool) -> std::path::PathBuf {
+pub fn write(volume: &Volume, name: &str, ras: bool) -> std::path::PathBuf {
     let sign = if ras { Vec3::new(-1.0, -1.0, 1.0) } else { Vec3::repeat(1.0) };
     let vector = |v: Vec3| {
         let v = v.component_mul(&sign) * 1e3;
@@ -165,6 +165,30 @@ fn labels_cropped_to_the_bones_are_taken_and_others_told() {
     assert!(matches!(told(&moved).unwrap_err(), MeshingError::Labels { .. }));
     moved.grid.origin += Vec3::new(-0.5, -0.12, 0.0);
     assert!(told(&moved).unwrap().warnings.iter().any(|w| matches!(w, Warning::LabelsOffBone { .. })));
+}
+
+#[test]
+fn labels_are_written_as_they_are_read() {
+    let scan = scan();
+    let mut wanted = labels(&scan, [2, 3]);
+    let turn = cutis::math::exp_rotation(&Vec3::new(0.1, -0.2, 0.3));
+    wanted.grid.direction = turn;
+    for name in ["written.nii", "written.nii.gz"] {
+        let path = fresh(name);
+        write_labels(&path, &wanted).unwrap();
+        let mut notes = Vec::new();
+        let found = read_labels(&path, &LabelMap::default(), &mut notes).unwrap();
+        assert!(notes.is_empty(), "{notes:?}");
+        assert_eq!((found.grid.dims, &found.ids), (wanted.grid.dims, &wanted.ids));
+        let apart = |a: Vec3, b: Vec3| (a - b).norm();
+        assert!(
+            apart(found.grid.origin, wanted.grid.origin) < 1e-7
+                && apart(found.grid.spacing, wanted.grid.spacing) < 1e-8
+        );
+        assert!((found.grid.direction - turn).norm() < 1e-6);
+    }
+    let e = write_labels(&fresh("written.nrrd"), &wanted).unwrap_err();
+    assert!(e.to_string().contains(".nii.gz"), "{e}");
 }
 
 #[test]

@@ -18,6 +18,8 @@ pub enum About {
     Bite,
     /// Where the jaw turns.
     Hinge,
+    /// Where the lips meet.
+    Mouth,
 }
 
 /// A figure of a split and the limits it must keep.
@@ -56,6 +58,8 @@ impl std::fmt::Display for Check {
     }
 }
 
+/// Least score of a fit that has found a mandible.
+pub(super) const LIKENESS: f64 = 0.6;
 /// A core point counts as found if mandible lies this near, mm.
 const FOUND: f64 = 3.5;
 /// A point nearer than this to the end of the field has no bone about it, mm.
@@ -94,7 +98,7 @@ impl Checked<'_> {
         let [body, ramus, condyle] = self.found();
         let [joint, elsewhere] = self.contact();
         let mut checks = vec![
-            bones("the likeness of the bone to a mandible", self.fit.score, least(0.6), ""),
+            bones("the likeness of the bone to a mandible", self.fit.score, least(LIKENESS), ""),
             bones("the share of the mandible's body that was found", body, least(0.8), ""),
             bones("the share of its rami that was found", ramus, least(0.75), ""),
             bones(

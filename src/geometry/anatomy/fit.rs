@@ -14,6 +14,8 @@ use crate::math::{Mat3, Vec3, exp_rotation};
 const BONE: [f32; 2] = [120.0, 420.0];
 /// Blurs of the bone for the coarse and the fine fit, mm.
 const BLUR: [f64; 2] = [3.5, 1.6];
+/// What a point of ramus or condyle beyond the field counts: with nothing the template slides in from its end.
+const UNSEEN: f64 = 0.35;
 /// Weight of bone where none should be.
 const SHELL: f64 = 1.1;
 /// Pitches tried: most degrees and their step.
@@ -64,8 +66,8 @@ pub(super) struct Fit {
     pub score: f64,
 }
 
-/// The best fit; none if no place has bone where a mandible has it.
-pub(super) fn fit(sought: &Sought, median: &Median) -> Option<Fit> {
+/// The best fit. Where no place has bone as a mandible has it, the template in the middle of the bone and its poor score.
+pub(super) fn fit(sought: &Sought, median: &Median) -> Fit {
     let bone = |(&v, &b): (&f32, &bool)| if b { ((v - BONE[0]) / (BONE[1] - BONE[0])).clamp(0.0, 1.0) } else { 0.0 };
     let bone = sought.hu.with(sought.hu.values.iter().zip(sought.body).map(bone).collect());
     let shape = Shape { core: core([16, 5, 9, 5]), shell: shell(), hinge: sought.hinge };
@@ -78,7 +80,10 @@ pub(super) fn fit(sought: &Sought, median: &Median) -> Option<Fit> {
     coarse.sort_by(|a, b| b.score.total_cmp(&a.score));
     let blurred = bone.blurred(BLUR[1]);
     let fine = coarse.into_iter().take(REFINED).map(|f| shape.refined(&blurred, &f.placed, &FINE));
-    fine.max_by(|a, b| a.score.total_cmp(&b.score))
+    fine.max_by(|a, b| a.score.total_cmp(&b.score)).unwrap_or_else(|| {
+        let placed = Placed::new(sought.axes, median.centre, [0.0; PARAMETERS]);
+        Fit { score: shape.score(&blurred, &placed), placed }
+    })
 }
 
 /// The points that are fitted.
@@ -152,7 +157,9 @@ impl Shape {
     fn score(&self, field: &Cubes, placed: &Placed) -> f64 {
         let (mut on, mut mass) = (0.0, 0.0);
         for (x, part) in &self.core {
-            on += part.weight() * field.sample(&placed.place(x)).unwrap_or(0.0);
+            // What lies over the end of the scan is not known; what is below is a jaw without its chin.
+            let beyond = if *part == Part::Body { 0.0 } else { UNSEEN };
+            on += part.weight() * field.sample(&placed.place(x)).unwrap_or(beyond);
             mass += part.weight();
         }
         let off: f64 = self.shell.iter().filter_map(|x| field.sample(&placed.place(x))).sum();

@@ -15,6 +15,7 @@ mod condyles;
 mod cubes;
 mod fit;
 mod flood;
+mod lips;
 mod median;
 mod seam;
 mod split;
@@ -22,20 +23,23 @@ mod template;
 
 pub use checks::{About, Check};
 pub(super) use flood::watershed;
+pub use lips::Lips;
 
 use super::bones::{BONES, LABELS, MANDIBLE, SKULL, bone_of};
 use super::{Labels, Volume};
 use crate::math::Vec3;
 use checks::Checked;
 use cubes::Cubes;
+use lips::Face;
 use seam::Seam;
 use split::LOOSE;
 
 /// Edge of the cubes that the template is fitted on, and of those that bone is split on, mm.
 const FITTED_ON: f64 = 2.0;
 const SPLIT_ON: f64 = 1.5;
-/// What hangs on the head by less than twice this is not of it, mm.
+/// What hangs on the head by less than twice this is not of it, mm; for the face less, or the hollow nose is lost.
 const BODY: f64 = 4.0;
+const FACE: f64 = 1.5;
 /// Label of soft tissue.
 const SOFT: u8 = 1;
 
@@ -46,8 +50,18 @@ pub struct Hints {
     pub hinge: Option<[Vec3; 2]>,
     /// A point of the surface where the teeth meet, and its normal.
     pub occlusal: Option<[Vec3; 2]>,
-    /// Places of a bone, by its name.
+    /// Right and left corner of the mouth.
+    pub commissures: Option<[Vec3; 2]>,
+    /// Places of a bone, by its name: bone within 3 mm of one is that bone's. With places of both skull and mandible the
+    /// bones are believed whatever the checks say, and where no mandible's shape is found they alone tell the bones apart.
     pub seeds: Vec<(String, Vec3)>,
+}
+
+impl Hints {
+    /// Whether the seeds are enough to tell the jaw apart.
+    pub(super) fn part_jaws(&self) -> bool {
+        ["skull", "mandible"].iter().all(|bone| self.seeds.iter().any(|s| s.0 == *bone))
+    }
 }
 
 /// What was found in a head.
@@ -59,6 +73,10 @@ pub struct Anatomy {
     pub checks: Vec<Check>,
     /// Right and left condyle, LPS, m, whether or not their checks hold.
     pub condyles: [Option<Vec3>; 2],
+    /// Where the lips meet, whether or not its checks hold.
+    pub lips: Lips,
+    /// Tip of the nose, LPS, m, if it is in the scan.
+    pub nose: Option<Vec3>,
 }
 
 impl Anatomy {
@@ -69,7 +87,7 @@ impl Anatomy {
 }
 
 /// Finds the anatomy of an upright scan by the thresholds of skin and bone, HU; with `labels` it is theirs, and only the
-/// hinge and the checks are found. None where nothing looks like a mandible.
+/// hinge and the checks are found. None where there is no bone.
 pub fn anatomy(volume: &Volume, labels: Option<&Labels>, [skin, bone]: [f64; 2], hints: &Hints) -> Option<Anatomy> {
     let grid = &volume.grid;
     let world = |p: &Vec3| grid.origin + grid.direction * p * 1e-3;
@@ -83,10 +101,12 @@ pub fn anatomy(volume: &Volume, labels: Option<&Labels>, [skin, bone]: [f64; 2],
     let jaw: Option<Vec<bool>> = labels.map(|_| (0..body.len()).map(|at| given(&coarse, at) == MANDIBLE).collect());
     let hinge = hints.hinge.map(|h| h.map(|p| local(&p)));
     let sought = fit::Sought { hu: &coarse, body: jaw.as_ref().unwrap_or(&body), axes, hinge };
-    let fit = fit::fit(&sought, &median)?;
+    let fit = fit::fit(&sought, &median);
     let hu = Cubes::of(volume, SPLIT_ON);
-    let inside: Vec<bool> =
-        (0..hu.values.len()).map(|at| body[coarse.grid.index(coarse.grid.nearest(&hu.place(at)))]).collect();
+    let finer = |body: &[bool]| -> Vec<bool> {
+        (0..hu.values.len()).map(|at| body[coarse.grid.index(coarse.grid.nearest(&hu.place(at)))]).collect()
+    };
+    let inside = finer(&body);
     let seam = match hints.occlusal {
         Some([point, normal]) => Seam::along(&fit.placed, &local(&point), &(axes * normal)),
         None => seam::seam(&hu, &fit.placed),
@@ -95,17 +115,26 @@ pub fn anatomy(volume: &Volume, labels: Option<&Labels>, [skin, bone]: [f64; 2],
     let seeds: Vec<_> = hints.seeds.iter().filter_map(|(name, p)| Some((number(name)?, local(p)))).collect();
     let split = match labels {
         Some(_) => split::labelled(&hu, bone, &fit.placed, &seam, |at| given(&hu, at)),
+        None if hints.part_jaws() && fit.score < checks::LIKENESS => {
+            split::seeded(&hu, &inside, bone, &fit.placed, &seam, &seeds)
+        }
         None => split::split(&hu, &inside, bone, &fit.placed, &seam, &seeds),
     };
     let condyles = condyles::condyles(&hu, &split);
     let mut checks = Checked { hu: &hu, median: &median, fit: &fit, seam: &seam, split: &split, condyles }.checks();
     // Labels say themselves which tooth is whose.
     checks.retain(|c| labels.is_none() || c.about != About::Bite);
+    let whole = finer(&coarse.body(skin, FACE));
+    let face = Face::of(&hu, &whole, skin, &fit, &seam);
+    let (line, of_mouth) = face.lips();
+    checks.extend(of_mouth);
+    let lips = Lips { line: line.iter().map(world).collect() };
+    let nose = face.nose().as_ref().map(world);
     let labels = match labels {
         Some(labels) => labels.clone(),
         None => Labels { grid: grid.clone(), ids: on_scan(volume, &hu, &inside, &split.map, skin, bone) },
     };
-    Some(Anatomy { labels, checks, condyles: condyles.map(|c| c.as_ref().map(world)) })
+    Some(Anatomy { labels, checks, condyles: condyles.map(|c| c.as_ref().map(world)), lips, nose })
 }
 
 /// Labels of the voxels: those inside a part of the cubes take its number, between parts the scan's own density decides.

@@ -91,6 +91,19 @@ pub(super) fn split(hu: &Cubes, body: &[bool], bone: f64, placed: &Placed, seam:
     Split { map, cubes }
 }
 
+/// The split by seeds alone: each bone is what its seeds reach first, densest bone first.
+pub(super) fn seeded(hu: &Cubes, body: &[bool], bone: f64, placed: &Placed, seam: &Seam, seeds: &[Seed]) -> Split {
+    let is_bone: Vec<bool> = hu.values.iter().zip(body).map(|(&v, &b)| b && f64::from(v) >= bone).collect();
+    let cubes = cubes(hu, &is_bone, placed, seam);
+    let mut map = vec![0u8; is_bone.len()];
+    for seed in seeds {
+        cubes.iter().filter(|c| (hu.place(c.at) - seed.1).norm() < INNER[0]).for_each(|c| map[c.at] = seed.0);
+    }
+    watershed(&hu.grid, |at| hu.values[at].min(DENSEST), |at| is_bone[at], &mut map);
+    map.iter_mut().zip(&is_bone).filter(|(m, b)| **b && **m == 0).for_each(|(m, _)| *m = LOOSE);
+    Split { map, cubes }
+}
+
 /// The split that labels say, by the bone of each cube.
 pub(super) fn labelled(hu: &Cubes, bone: f64, placed: &Placed, seam: &Seam, of: impl Fn(usize) -> u8) -> Split {
     let is_bone = |at: usize| f64::from(hu.values[at]) >= bone;

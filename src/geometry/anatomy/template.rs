@@ -142,18 +142,21 @@ fn outward(body: &[[f64; 4]], i: usize) -> Vec3 {
     if normal.dot(&Vec3::new(x + 1e-9, y + 20.0, 0.0)) < 0.0 { -normal } else { normal }
 }
 
+/// The station of [`arch`] that lies in the median plane.
+pub(super) const HALF_ARCH: usize = 19;
+
 /// The crest of the lower teeth as stations from right to left, with the normal of the arch at each.
 pub(super) fn arch() -> Vec<(Vec3, Vec3)> {
-    /// Stations along one side, and how many of them carry teeth.
-    const SIDE: [usize; 2] = [24, 20];
-    let body = along::<4, 2>(&BODY, SIDE[0]);
+    /// Stations along the body on one side.
+    const SIDE: usize = 24;
+    let body = along::<4, 2>(&BODY, SIDE);
     let station = |i: usize| {
         let [x, y, _, crest] = body[i];
         (Vec3::new(x, y, crest), outward(&body, i))
     };
     let mirrored = |(p, n): (Vec3, Vec3)| (Vec3::new(-p.x, p.y, p.z), Vec3::new(-n.x, n.y, 0.0));
-    let right = (1..SIDE[1]).rev().map(|i| mirrored(station(i)));
-    right.chain((0..SIDE[1]).map(station)).collect()
+    let right = (1..=HALF_ARCH).rev().map(|i| mirrored(station(i)));
+    right.chain((0..=HALF_ARCH).map(station)).collect()
 }
 
 /// The crest as a dense line on both sides: plan and height.
@@ -182,6 +185,11 @@ impl Placed {
     pub fn new(axes: Mat3, origin: Vec3, p: [f64; PARAMETERS]) -> Self {
         let rotation = axes * exp_rotation(&Vec3::new(p[3], p[4], p[5]));
         Self { axes, origin, p, rotation, size: Vec3::new(p[6].exp(), p[7].exp(), p[8].exp()) }
+    }
+
+    /// Axes of the template in the scan, as columns: left, back, up.
+    pub fn rotation(&self) -> &Mat3 {
+        &self.rotation
     }
 
     /// Sizes along left, back and up against the template.
