@@ -47,7 +47,7 @@ enum Command {
     /// Make the synthetic head, pack it as FMU, open its jaw, push on its cheek, draw a picture
     Demo(demo::Demo),
     /// From a head CT to a tissue mesh
-    Bake(bake::Bake),
+    Bake(Box<bake::Bake>),
     /// Run a scene's programme; writes a table, a ParaView series and a picture
     Run(run::Run),
     /// Pack a scene as FMI 3.0 and FMI 2.0 co-simulation components

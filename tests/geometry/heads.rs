@@ -152,7 +152,7 @@ impl Head {
         assert!(!teeth.is_empty());
         for _ in 0..fillings {
             let at = teeth[(random.number() * teeth.len() as f64) as usize];
-            let phase: Vec<f64> = (0..4).map(|_| 6.28 * random.number()).collect();
+            let phase: Vec<f64> = (0..4).map(|_| std::f64::consts::TAU * random.number()).collect();
             for (p, s) in points(grid).zip(&mut head.volume.samples) {
                 if (p.z - at.z).abs() > 1.6 * MM {
                     continue;

@@ -96,7 +96,9 @@ impl Checked<'_> {
             count(&|c| (self.hu.place(c.at) - self.median.offset * self.median.normal).dot(&self.median.normal) > 0.0);
         let far = count(&|c| c.off > if c.x.y < FRONT { 22.0 } else { 10.0 });
         let [body, ramus, condyle] = self.found();
-        let [joint, elsewhere] = self.contact();
+        // Areas at middle size.
+        let area = placed.size().product().powf(2.0 / 3.0);
+        let [joint, elsewhere] = self.contact().map(|a| a / area);
         let mut checks = vec![
             bones("the likeness of the bone to a mandible", self.fit.score, least(LIKENESS), ""),
             bones("the share of the mandible's body that was found", body, least(0.8), ""),
@@ -110,7 +112,12 @@ impl Checked<'_> {
             bones("its difference between left and right", (2.0 * left / n - 1.0).abs(), most(0.16), ""),
             bones("what it has above the teeth", count(&|c| c.x.y < FRONT && c.over > 4.0) * ml, most(1.5), "mL"),
             bones("the share of it that lies off its place", far / n, most(0.04), ""),
-            bones("what of it the end of the scan cuts off below the joints", self.cut_off(&jaw), most(16.0), "cm2"),
+            bones(
+                "what of it the end of the scan cuts off below the joints",
+                self.cut_off(&jaw) / area,
+                most(16.0),
+                "cm2",
+            ),
             bones("its contact with the skull in the joints", joint, most(11.0), "cm2"),
             bones("its contact with the skull elsewhere", elsewhere, most(5.5), "cm2"),
         ];

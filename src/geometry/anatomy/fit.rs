@@ -28,8 +28,8 @@ const PLACES: (i32, usize) = (140, 7);
 const LEAST: f64 = 0.2;
 /// Best places of each pitch and size that are gathered; places that are fitted; fits that are refined.
 const GATHERED: usize = 12;
-const FITTED: usize = 4;
-const REFINED: usize = 2;
+const FITTED: usize = 8;
+const REFINED: usize = 3;
 /// Places nearer than this (mm) with pitches nearer than this (rad) are one.
 const APART: (f64, f64) = (9.0, 0.2);
 /// One standard deviation of each number at the start of a search.

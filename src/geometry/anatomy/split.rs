@@ -189,7 +189,7 @@ fn part_spine(hu: &Cubes, cubes: &[Cube], map: &mut [u8], seeds: &[u8], density:
             HYOID
         } else if z < -42.0 && y > -14.0 && y < 62.0 && x < 42.0 {
             SPINE
-        } else if z > -6.0 || y < -30.0 || y > 85.0 {
+        } else if z > -6.0 || !(-30.0..=85.0).contains(&y) {
             SKULL
         } else {
             0
