@@ -57,6 +57,8 @@ pub(super) struct Face<'a> {
     origin: Vec3,
     /// Height of the bite in front.
     bite: f64,
+    /// Size of the jaw across, against the usual one.
+    size: f64,
     columns: usize,
     rows: usize,
     /// Skin, row by row from below; [`END`] where there is none.
@@ -70,7 +72,8 @@ impl<'a> Face<'a> {
         let bite = (rotation.transpose() * (fit.placed.place(&front) - origin)).z;
         let columns = (2.0 * WIDE / STEP) as usize + 1;
         let rows = ((HIGH - LOW) / STEP) as usize + 1;
-        let mut face = Self { hu, inside, rotation, origin, bite, columns, rows, depth: Vec::new() };
+        let size = fit.placed.size().x;
+        let mut face = Self { hu, inside, rotation, origin, bite, size, columns, rows, depth: Vec::new() };
         face.depth =
             (0..rows).flat_map(|r| (0..columns).map(move |c| (c, r))).map(|(c, r)| face.skin(c, r, skin)).collect();
         face
@@ -210,7 +213,7 @@ impl<'a> Face<'a> {
         let check = |what, value, limits, unit| Check { what, value, limits, unit, about: About::Mouth };
         let checks = vec![
             check("the depth of the line between the lips", middle, [SHALLOW.0, f64::INFINITY], "HU"),
-            check("the width of the mouth", widths[0] + widths[1], [35.0, 65.0], "mm"),
+            check("the width of the mouth at middle size", (widths[0] + widths[1]) / self.size, [35.0, 65.0], "mm"),
             check("the unevenness of its corners", (widths[0] - widths[1]).abs(), [f64::NEG_INFINITY, 6.0], "mm"),
         ];
         let line = (right..=left).map(|i| {
