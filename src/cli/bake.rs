@@ -1,13 +1,15 @@
 //! `cutis bake`: from a head CT to a tissue mesh.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use cutis::geometry::anatomy::Hints;
 use cutis::geometry::{BakeOptions, Warning, bake};
 use cutis::io::{self, LabelMap};
 
 use super::bake_file::{BakeFile, Seed, metres, pair};
-use super::progress;
+use super::bake_report::{json, levels, tell};
+use super::fineness::Fineness;
+use super::{portrait, progress};
 
 #[derive(clap::Args)]
 pub struct Bake {
@@ -22,9 +24,8 @@ pub struct Bake {
     /// Mesh to write: .cutis, .msh, .vtu or .vtk
     #[arg(short, long, default_value = "face.cutis")]
     out: PathBuf,
-    /// Edge of the lattice cell, mm [default: 4]
-    #[arg(long, allow_negative_numbers = true)]
-    edge: Option<f64>,
+    #[command(flatten)]
+    fineness: Fineness,
     /// Threshold of the skin, HU [default: -300]
     #[arg(long, allow_negative_numbers = true)]
     skin: Option<f64>,
@@ -61,6 +62,12 @@ pub struct Bake {
     /// Leave the lips closed
     #[arg(long)]
     no_slit: bool,
+    /// Also write what the mesh is worth as JSON
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Draw no picture beside the mesh
+    #[arg(long)]
+    no_picture: bool,
 }
 
 impl Bake {
@@ -91,25 +98,31 @@ impl Bake {
         for warning in &baked.warnings {
             eprintln!("warning: {warning}");
         }
-        say!("{}", baked.report);
-        for set in &baked.mesh.node_sets {
-            say!("bone {:<12} {} nodes", set.name, set.nodes.len());
+        for (k, level) in levels(&baked).enumerate() {
+            if k > 0 {
+                say!();
+            }
+            tell(level);
         }
-        for layer in &baked.layers {
-            say!("layer {:<11} {:.1} % of the volume", layer.name, 100.0 * layer.reached);
-        }
-        say!(
-            "slit: {} nodes doubled; {} bone nodes released between two bones",
-            baked.slit_nodes,
-            baked.released_nodes
-        );
         if let Some([right, left]) = baked.condyles {
             let p = 0.5 * (right + left);
             println!("jaw: the line for [[bone]] mandible, between the condyles:");
             println!("pivot = [{:.4}, {:.4}, {:.4}]", p.x, p.y, p.z);
         }
-        io::write_mesh(&self.out, &baked.mesh)?;
-        say!("wrote {}", self.out.display());
+        for (k, level) in levels(&baked).enumerate() {
+            let path = numbered(&self.out, k);
+            io::write_mesh(&path, &level.mesh)?;
+            say!("wrote {}", path.display());
+        }
+        if let Some(path) = &self.report {
+            io::write_bytes(path, json(&baked).as_bytes())?;
+            say!("wrote {}", path.display());
+        }
+        if !self.no_picture {
+            let path = self.out.with_extension("png");
+            io::write_bytes(&path, &portrait::of(&baked.finest.mesh).to_png())?;
+            say!("wrote {}", path.display());
+        }
         if let Some(path) = &self.write_labels {
             let Some(labels) = &baked.labels else {
                 return Err(format!("{}: no labels were found that could be written", path.display()).into());
@@ -126,10 +139,7 @@ impl Bake {
     /// What the command line says, else the file, else what is usual.
     fn options(&self, file: BakeFile) -> Result<BakeOptions, Box<dyn std::error::Error>> {
         let usual = BakeOptions::default();
-        let edge = self.edge.or(file.edge).unwrap_or(1e3 * usual.edge);
-        if !(edge.is_finite() && edge > 0.0) {
-            return Err(format!("--edge takes a length above 0 in mm; found {edge} mm").into());
-        }
+        self.fineness.checked()?;
         let places = |option: &str, line: &Option<Vec<f64>>, file: Option<[[f64; 3]; 2]>| {
             let pair = line.as_deref().and_then(pair).or(file);
             match pair.filter(|p| p.as_flattened().iter().any(|v| !v.is_finite())) {
@@ -157,7 +167,10 @@ impl Bake {
             skin_hu: self.skin.or(file.skin).unwrap_or(usual.skin_hu),
             bone_hu: self.bone.or(file.bone).unwrap_or(usual.bone_hu),
             roi: places("--roi", &self.roi, file.region)?,
-            edge: 1e-3 * edge,
+            resolution: self.fineness.resolution(file.edge),
+            depth: 1e-3 * self.fineness.depth,
+            layers: self.fineness.layers(),
+            fat_by_hu: self.fineness.fat.is_none(),
             slit: !self.no_slit,
             mouth: places("--mouth", &self.mouth, file.mouth)?,
             hints: Hints {
@@ -167,7 +180,15 @@ impl Bake {
                 seeds,
             },
             strict: self.strict,
-            ..usual
         })
+    }
+}
+
+/// The file of a level: the name asked for, and with a number for the coarser ones.
+fn numbered(path: &Path, level: usize) -> PathBuf {
+    match (level, path.extension()) {
+        (0, _) => path.into(),
+        (_, Some(ending)) => path.with_extension(format!("{level}.{}", ending.to_string_lossy())),
+        (_, None) => path.with_extension(level.to_string()),
     }
 }

@@ -10,11 +10,14 @@ macro_rules! say {
 
 mod bake;
 mod bake_file;
+mod bake_report;
 mod bench;
 mod check;
 mod demo;
+mod fineness;
 mod fmu;
 mod output;
+mod portrait;
 mod presets;
 mod progress;
 mod run;

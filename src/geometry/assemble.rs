@@ -1,9 +1,10 @@
 //! From stuffed tetrahedra to a mesh that scenes can name: slit, face sets, bones, what is released.
 
 use super::Field;
+use super::mesher::{Face, SHEET};
 use super::repair::{ROUNDS, compact, smaller_fans};
 use super::stencils::Stuffed;
-use super::stuffing::{NO_WALL, Wall};
+use super::stuffing::NO_WALL;
 use super::topology::{FACES, OPEN, boundary, components, fans, neighbours, pinched_edges, stars};
 use crate::math::Vec3;
 use crate::mesh::{FaceSet, NodeSet, SKIN, TetMesh};
@@ -28,19 +29,13 @@ pub(super) struct Bone<'a> {
     pub field: &'a dyn Field,
 }
 
-/// Whether the face (its corners) between two tetrahedra (their middles) is part of the oral slit.
-pub(super) type Slit<'a> = &'a dyn Fn([Vec3; 3], Vec3, Vec3) -> bool;
-
 /// Everything that names a boundary.
 pub(super) struct Naming<'a> {
-    pub walls: &'a [Wall<'a>],
+    /// What each wall is; triangles of none are where the region of interest ends.
     pub kinds: &'a [Kind],
     pub bones: &'a [Bone<'a>],
-    /// Lattice edge, m.
-    pub edge: f64,
     /// Bone nodes nearer than this to a second bone are released, m.
     pub apart: &'a dyn Fn(&Vec3) -> f64,
-    pub slit: Option<Slit<'a>>,
     /// Whether a skin point faces the outer air; inner air is free.
     pub is_outer: &'a dyn Fn(&Vec3) -> bool,
 }
@@ -52,12 +47,10 @@ pub(super) struct Assembled {
     pub released_nodes: usize,
 }
 
-/// Cuts the slit and names faces and nodes. Regions are left as one.
-pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
-    let (outer, slit_nodes) = match naming.slit {
-        Some(slit) => open(&mut stuffed, slit),
-        None => (vec![[true; 4]; stuffed.tets.len()], 0),
-    };
+/// Parts the mesh along its sheet and names faces and nodes. Regions are left as one.
+pub(super) fn assemble(mut stuffed: Stuffed, faces: &[Face], naming: &Naming) -> Assembled {
+    let mut walls = walls_of(&stuffed.tets, faces);
+    let slit_nodes = if faces.iter().any(|f| f.1 == SHEET) { open(&mut stuffed, &mut walls) } else { 0 };
     let adjacent = neighbours(&stuffed.tets);
     let (bone_of, released_nodes) = bones(&stuffed, naming);
     let mut names: Vec<&str> = vec![SKIN];
@@ -68,8 +61,12 @@ pub(super) fn assemble(mut stuffed: Stuffed, naming: &Naming) -> Assembled {
     for (e, tet) in stuffed.tets.iter().enumerate() {
         for f in (0..4).filter(|&f| adjacent[e][f] == OPEN) {
             let t = FACES[f].map(|a| tet[a]);
-            let set = match kind(&stuffed, t, naming) {
-                _ if !outer[e][f] => free,
+            let kind = match walls[e][f] {
+                SHEET | INNER => Kind::Free,
+                NO_WALL => Kind::Cut,
+                wall => naming.kinds[usize::from(wall)],
+            };
+            let set = match kind {
                 Kind::Skin if (naming.is_outer)(&middle(&stuffed, &t)) => 0,
                 Kind::Bone => match t.map(|a| bone_of[a as usize]) {
                     [Some(a), Some(b), Some(c)] if a == b && b == c => 1 + a,
@@ -106,21 +103,19 @@ fn middle(stuffed: &Stuffed, nodes: &[u32]) -> Vec3 {
     nodes.iter().map(|&a| stuffed.nodes[a as usize]).sum::<Vec3>() / nodes.len() as f64
 }
 
-/// What a boundary triangle is: its corners' wall if they agree, else the wall nearest to its middle.
-fn kind(stuffed: &Stuffed, t: [u32; 3], naming: &Naming) -> Kind {
-    let [a, b, c] = t.map(|a| stuffed.wall[a as usize]);
-    let kind_of = |w: u8| naming.kinds.get(usize::from(w)).copied();
-    if let (Some(a), Some(b), Some(c)) = (kind_of(a), kind_of(b), kind_of(c))
-        && a == b
-        && b == c
-    {
-        return a;
-    }
-    let p = middle(stuffed, &t);
-    let distance = |w: usize| naming.walls[w].depth(&p).abs();
-    let nearest = (0..naming.walls.len()).map(|w| (distance(w), w)).min_by(|p, q| p.0.total_cmp(&q.0));
-    // Far from every wall the lattice itself ended.
-    nearest.filter(|(d, _)| *d < 0.3 * naming.edge).map_or(Kind::Cut, |(_, w)| naming.kinds[w])
+/// Mark of a face between two tetrahedra.
+const INNER: u8 = SHEET - 1;
+
+/// The wall of each tetrahedron's faces.
+fn walls_of(tets: &[[u32; 4]], faces: &[Face]) -> Vec<[u8; 4]> {
+    let sorted = |mut t: [u32; 3]| {
+        t.sort_unstable();
+        t
+    };
+    let mut listed: Vec<Face> = faces.iter().map(|&(t, wall)| (sorted(t), wall)).collect();
+    listed.sort_unstable();
+    let of = |t: [u32; 3]| listed.binary_search_by_key(&sorted(t), |f| f.0).map_or(INNER, |k| listed[k].1);
+    tets.iter().map(|tet| FACES.map(|f| of(f.map(|a| tet[a])))).collect()
 }
 
 /// The bone each boundary node is held by; nodes near a second bone are held by none.
@@ -143,14 +138,37 @@ fn bones(stuffed: &Stuffed, naming: &Naming) -> (Vec<Option<usize>>, usize) {
     (held, released)
 }
 
-/// Parts the tetrahedra along the slit's faces, and drops what the slit cuts off or pinches. Returns for each tetrahedron
-/// which of its faces were boundary before, and the number of nodes doubled.
-fn open(stuffed: &mut Stuffed, slit: Slit) -> (Vec<[bool; 4]>, usize) {
+/// Edges between nodes that two bones hold, each with its middle: what joins bones must have a free node between them.
+pub(super) fn bridges(stuffed: &Stuffed, naming: &Naming) -> Vec<([usize; 2], Vec3)> {
+    let (bone_of, _) = bones(stuffed, naming);
+    let mut out = Vec::new();
+    for t in &stuffed.tets {
+        for (i, &a) in t.iter().enumerate() {
+            for &b in &t[..i] {
+                let [a, b] = [a.min(b) as usize, a.max(b) as usize];
+                if let (Some(p), Some(q)) = (bone_of[a], bone_of[b])
+                    && p != q
+                {
+                    out.push([a, b]);
+                }
+            }
+        }
+    }
+    out.sort_unstable();
+    out.dedup();
+    out.into_iter().map(|e| (e, 0.5 * (stuffed.nodes[e[0]] + stuffed.nodes[e[1]]))).collect()
+}
+
+/// Parts the tetrahedra along the sheet's faces, and drops what it cuts off or pinches; the walls of the faces follow.
+/// Returns the number of nodes doubled.
+fn open(stuffed: &mut Stuffed, walls: &mut Vec<[u8; 4]>) -> usize {
     let mut adjacent = neighbours(&stuffed.tets);
-    let mut outer: Vec<[bool; 4]> = adjacent.iter().map(|a| a.map(|other| other == OPEN)).collect();
-    for [e, f, other, back] in slit_faces(stuffed, &adjacent, slit) {
-        adjacent[e][f] = OPEN;
-        adjacent[other][back] = OPEN;
+    for (a, walls) in adjacent.iter_mut().zip(&*walls) {
+        for (other, wall) in a.iter_mut().zip(walls) {
+            if *wall == SHEET {
+                *other = OPEN;
+            }
+        }
     }
     for _ in 0..ROUNDS {
         double_nodes(stuffed, &adjacent);
@@ -161,43 +179,21 @@ fn open(stuffed: &mut Stuffed, slit: Slit) -> (Vec<[bool; 4]>, usize) {
             break;
         }
         let gone = smaller_fans(stuffed, &edges, &adjacent);
-        retain(stuffed, &mut outer, |e| !gone[e]);
+        retain(stuffed, walls, |e| !gone[e]);
         adjacent = neighbours(&stuffed.tets);
     }
-    keep_largest(stuffed, &mut outer);
+    keep_largest(stuffed, walls);
     let mut places: Vec<[u64; 3]> =
         stuffed.nodes.iter().map(|x| [x.x, x.y, x.z].map(|c| (c + 0.0).to_bits())).collect();
     places.sort_unstable();
-    let doubled = places.windows(2).filter(|w| w[0] == w[1]).count();
-    (outer, doubled)
+    places.windows(2).filter(|w| w[0] == w[1]).count()
 }
 
-fn retain(stuffed: &mut Stuffed, outer: &mut Vec<[bool; 4]>, keep: impl Fn(usize) -> bool) {
+fn retain(stuffed: &mut Stuffed, walls: &mut Vec<[u8; 4]>, keep: impl Fn(usize) -> bool) {
     let mut at = 0..stuffed.tets.len();
     stuffed.tets.retain(|_| at.next().is_some_and(&keep));
-    let mut at = 0..outer.len();
-    outer.retain(|_| at.next().is_some_and(&keep));
-}
-
-/// Faces of the slit: tetrahedron, face, and the same from the other side.
-fn slit_faces(stuffed: &Stuffed, adjacent: &[[u32; 4]], slit: Slit) -> Vec<[usize; 4]> {
-    let mut faces = Vec::new();
-    for e in 0..stuffed.tets.len() {
-        for f in 0..4 {
-            let other = adjacent[e][f];
-            if other == OPEN || (other as usize) < e {
-                continue;
-            }
-            let corners = FACES[f].map(|a| stuffed.nodes[stuffed.tets[e][a] as usize]);
-            let middles = [e, other as usize].map(|e| middle(stuffed, &stuffed.tets[e]));
-            if slit(corners, middles[0], middles[1]) {
-                let other = other as usize;
-                let back = (0..4).find(|&g| adjacent[other][g] == e as u32).expect("neighbours know each other");
-                faces.push([e, f, other, back]);
-            }
-        }
-    }
-    faces
+    let mut at = 0..walls.len();
+    walls.retain(|_| at.next().is_some_and(&keep));
 }
 
 /// Gives every fan of tetrahedra round a boundary node a node of its own.
@@ -214,6 +210,7 @@ fn double_nodes(stuffed: &mut Stuffed, adjacent: &[[u32; 4]]) {
             let copy = stuffed.nodes.len() as u32;
             stuffed.nodes.push(stuffed.nodes[node]);
             stuffed.wall.push(stuffed.wall[node]);
+            stuffed.plane.push(stuffed.plane[node]);
             edits.extend((0..star.len()).filter(|&k| group[k] == fan).map(|k| (star[k] as usize, node as u32, copy)));
         }
     }
@@ -223,11 +220,11 @@ fn double_nodes(stuffed: &mut Stuffed, adjacent: &[[u32; 4]]) {
 }
 
 /// Drops all but the largest component.
-fn keep_largest(stuffed: &mut Stuffed, outer: &mut Vec<[bool; 4]>) {
+fn keep_largest(stuffed: &mut Stuffed, walls: &mut Vec<[u8; 4]>) {
     let (component, n) = components(&neighbours(&stuffed.tets));
     let mut sizes = vec![0usize; n];
     component.iter().for_each(|&c| sizes[c as usize] += 1);
     let keep = (0..n).max_by_key(|&c| (sizes[c], n - c)).unwrap_or(0) as u32;
-    retain(stuffed, outer, |e| component[e] == keep);
+    retain(stuffed, walls, |e| component[e] == keep);
     compact(stuffed);
 }

@@ -72,6 +72,16 @@ impl Field for Isosurface<'_> {
 
 /// Unsigned distance to a surface on every sample of a grid.
 pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
+    let mut values = band(grid, surface);
+    let fixed: Vec<bool> = values.iter().map(|v| v.is_finite()).collect();
+    (0..8).for_each(|direction| {
+        sweep(grid, &mut values, &fixed, direction);
+    });
+    values
+}
+
+/// Exact unsigned distance to a surface on the samples next to it, infinite elsewhere.
+pub(super) fn band(grid: &Grid, surface: &Surface) -> Vec<f32> {
     let mut values = vec![f32::INFINITY; grid.len()];
     let reach = grid.spacing.map(|s| BAND * s);
     // Grid coordinates in metres: the axes are orthonormal, so distances are kept.
@@ -98,35 +108,37 @@ pub fn unsigned(grid: &Grid, surface: &Surface) -> Vec<f32> {
             }
         }
     }
-    let fixed: Vec<bool> = values.iter().map(|v| v.is_finite()).collect();
-    (0..8).for_each(|direction| sweep(grid, &mut values, &fixed, direction));
     values
 }
 
-/// Length of the shortest way from the sources to every sample round what is blocked; beyond the blocks' surfaces it is
-/// carried on smoothly.
+/// Length of the shortest way from the sources to every sample round what is blocked; infinite in it.
 pub(super) fn travel(grid: &Grid, sources: &[bool], blocked: &[bool]) -> Vec<f32> {
     let mut values: Vec<f32> = sources.iter().map(|&s| if s { 0.0 } else { f32::INFINITY }).collect();
     let fixed: Vec<bool> = sources.iter().zip(blocked).map(|(&s, &b)| s || b).collect();
     // Ways wind round bones: each bend may need another round.
     for _ in 0..WINDING_ROUNDS {
-        for direction in 0..8 {
-            sweep(grid, &mut values, &fixed, direction);
+        if (0..8).map(|direction| sweep(grid, &mut values, &fixed, direction)).sum::<usize>() == 0 {
+            break;
         }
-    }
-    let known: Vec<bool> = blocked.iter().map(|&b| !b).collect();
-    for direction in 0..8 {
-        sweep(grid, &mut values, &known, direction);
     }
     values
 }
 
-/// One pass of |grad d| = 1 through the grid; bits of `direction` turn the axes round.
-fn sweep(grid: &Grid, values: &mut [f32], fixed: &[bool], direction: usize) {
+/// Carries a length on, with a slope of one, from the samples that are known to all others.
+pub(super) fn carry_on(grid: &Grid, values: &mut [f32], known: &[bool]) {
+    values.iter_mut().zip(known).filter(|(_, k)| !**k).for_each(|(v, _)| *v = f32::INFINITY);
+    (0..8).for_each(|direction| {
+        sweep(grid, values, known, direction);
+    });
+}
+
+/// One pass of |grad d| = 1 through the grid; bits of `direction` turn the axes round. Returns how many samples changed.
+fn sweep(grid: &Grid, values: &mut [f32], fixed: &[bool], direction: usize) -> usize {
     let [nx, ny, nz] = grid.dims;
     let turned = |c: usize, n: usize, a: usize| if direction >> a & 1 == 1 { n - 1 - c } else { c };
     let h = [grid.spacing.x, grid.spacing.y, grid.spacing.z];
     let strides = [1, nx, nx * ny];
+    let mut changed = 0;
     for k in 0..nz {
         let k = turned(k, nz, 2);
         for j in 0..ny {
@@ -137,19 +149,25 @@ fn sweep(grid: &Grid, values: &mut [f32], fixed: &[bool], direction: usize) {
                 if fixed[at] {
                     continue;
                 }
-                let mut upwind = [(f64::INFINITY, 1.0); 3];
+                let mut near = [f32::INFINITY; 3];
                 for (a, (c, n)) in [(i, nx), (j, ny), (k, nz)].into_iter().enumerate() {
                     let below = if c > 0 { values[at - strides[a]] } else { f32::INFINITY };
                     let above = if c + 1 < n { values[at + strides[a]] } else { f32::INFINITY };
-                    upwind[a] = (f64::from(below.min(above)), h[a]);
+                    near[a] = below.min(above);
                 }
-                let d = eikonal(upwind) as f32;
+                // No way shortens what is not longer than all it could come from.
+                if near[0].min(near[1]).min(near[2]) >= values[at] {
+                    continue;
+                }
+                let d = eikonal([0, 1, 2].map(|a| (f64::from(near[a]), h[a]))) as f32;
                 if d < values[at] {
                     values[at] = d;
+                    changed += 1;
                 }
             }
         }
     }
+    changed
 }
 
 /// Solves sum over axes of ((d - u)+ / h)^2 = 1 for d.

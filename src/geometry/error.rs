@@ -14,6 +14,12 @@ pub enum MeshingError {
         /// The value found.
         found: f64,
     },
+    /// A factor on errors and edges that would make them smaller.
+    #[error("errors and edges may grow by a factor of 1 or more away from the mouth; found {found}")]
+    Growth {
+        /// The factor found.
+        found: f64,
+    },
     /// More elements than the 32-bit node numbers of a mesh can hold.
     #[error(
         "{what} would need {found} nodes, more than the {limit} that fit a mesh; choose fewer cells or a longer edge"
@@ -60,9 +66,12 @@ pub enum MeshingError {
     },
     /// A region of interest that does not meet the volume.
     #[error(
-        "the region of interest {region:.3?} m does not overlap the volume {volume:.3?} m by two lattice edges; give it in LPS coordinates of the scan"
+        "the region of interest {region:.3?} m does not overlap the volume {volume:.3?} m by {:.0} mm; give it in LPS coordinates of the scan",
+        least * 1e3
     )]
     Region {
+        /// Least overlap along each axis, m.
+        least: f64,
         /// Corners asked for, LPS, m.
         region: [[f64; 3]; 2],
         /// Corners of the volume, LPS, m.

@@ -1,11 +1,15 @@
 //! Where things are in a head: the tip of the nose, the region of interest, the condyles, the mouth.
 
 use super::clean::components;
+use super::shapes::join;
+use super::slit::both;
 use super::{BakeOptions, Cuboid, Field, MeshingError, Surface, Volume};
 use crate::math::Vec3;
 
 /// The face about the nose tip, m: to the right, in front, below; to the left, behind, above.
 const FACE: [[f64; 3]; 2] = [[-0.086, -0.006, -0.096], [0.086, 0.122, 0.082]];
+/// Least size of the region of interest along each axis, m.
+const OVERLAP: f64 = 8e-3;
 /// Thickness of the foremost layer of skin, in voxels.
 const LAYER: f64 = 0.5;
 /// What places are rounded to, m.
@@ -57,8 +61,12 @@ pub(super) fn region(volume: &Volume, options: &BakeOptions, nose: &Vec3) -> Res
     let [low, high] = volume.grid.bounds();
     let [from, to] = options.roi.unwrap_or(FACE.map(|c| nose + Vec3::from(c)));
     let region = Cuboid { low: rounded(from.inf(&to).sup(&low)), high: rounded(from.sup(&to).inf(&high)) };
-    if (region.high - region.low).min() < 2.0 * options.edge {
-        return Err(MeshingError::Region { region: [from.into(), to.into()], volume: [low.into(), high.into()] });
+    if (region.high - region.low).min() < OVERLAP {
+        return Err(MeshingError::Region {
+            least: OVERLAP,
+            region: [from.into(), to.into()],
+            volume: [low.into(), high.into()],
+        });
     }
     Ok(region)
 }
@@ -79,15 +87,27 @@ impl Mouth {
         Self { lips, bite: Cuboid { low, high: Vec3::new(lips.high.x + BITE[0], lips.high.y + BITE[1], z + BITE[2]) } }
     }
 
-    /// Whether the slit may run through a point, by the distances from skull and mandible and the depth under the skin.
-    pub fn parts(&self, p: &Vec3, to: [&dyn Field; 2], depth: &dyn Field) -> bool {
-        let between = || depth.at(p) > CHEEK && to.iter().all(|d| d.at(p) < CROWN);
-        self.lips.at(p) < 0.0 || self.bite.at(p) < 0.0 && between()
+    /// Corners of the box that lips and bite fill together, m.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        (self.lips.low.inf(&self.bite.low), self.lips.high.sup(&self.bite.high))
     }
 
-    /// How near a second bone may be to a point that a bone holds, m; `edge` outside the bite.
-    pub fn apart(&self, p: &Vec3, edge: f64) -> f64 {
-        if self.bite.at(p) < 0.0 { edge.max(CROWN) } else { edge }
+    /// Distance from the rim of the slit, negative where tissue is parted: by the distances from skull and mandible and the
+    /// depth under the skin, m; `blend` is the radius of its corners.
+    pub fn rim(&self, p: &Vec3, to: [f64; 2], depth: f64, blend: f64) -> f64 {
+        let beyond = |b: &Cuboid, a: usize| (b.low[a] - p[a]).max(p[a] - b.high[a]);
+        let lips = [p.y - self.lips.high.y, beyond(&self.lips, 2)]
+            .into_iter()
+            .fold(beyond(&self.lips, 0), |all, d| both(all, d, blend));
+        let bite = [to[1] - CROWN, CHEEK - depth, beyond(&self.bite, 0), p.y - self.bite.high.y, beyond(&self.bite, 2)]
+            .into_iter()
+            .fold(to[0] - CROWN, |all, d| both(all, d, blend));
+        join(lips, bite, blend)
+    }
+
+    /// How near a second bone may be to a point that a bone holds, m; `joint` outside the bite.
+    pub fn apart(&self, p: &Vec3, joint: f64) -> f64 {
+        if self.bite.at(p) < 0.0 { joint.max(CROWN) } else { joint }
     }
 }
 

@@ -11,7 +11,22 @@ pub trait Field: Sync {
     fn level(&self, p: &Vec3) -> f64 {
         self.at(p)
     }
+
+    /// Value and gradient at a world position; by differences unless a field knows better.
+    fn slope(&self, p: &Vec3) -> (f64, Vec3) {
+        (
+            self.at(p),
+            Vec3::from_fn(|a, _| {
+                let mut step = Vec3::zeros();
+                step[a] = NEAR;
+                (self.at(&(p + step)) - self.at(&(p - step))) / (2.0 * NEAR)
+            }),
+        )
+    }
 }
+
+/// Half the width of a difference, m: far below any mesh edge.
+const NEAR: f64 = 1e-5;
 
 impl<F: Fn(&Vec3) -> f64 + Sync> Field for F {
     fn at(&self, p: &Vec3) -> f64 {

@@ -6,9 +6,12 @@
 
 use super::assemble::{Assembled, Bone, Kind, Naming, assemble};
 use super::label::Layers;
+use super::mesher::SHEET;
 use super::shapes::{arch, carve, ellipsoid, join, rod};
 use super::stencils::Stuffed;
 use super::stuffing::{Side, Wall};
+use super::tetrahedralise::name_boundary;
+use super::topology::{FACES, OPEN, neighbours};
 use super::{Cuboid, Lattice, LatticePlane, MeshReport, MeshingError, stuff};
 use crate::math::{Mat3, Vec3};
 use crate::mesh::TetMesh;
@@ -146,16 +149,15 @@ impl Head {
             let flat = corners.iter().all(|c| c.z.abs() < 1e-3 * self.edge && c.x.abs() < MOUTH + 0.25 * self.edge);
             flat && a.z * b.z < 0.0 && corners.iter().all(|c| c.y < TEETH)
         };
+        let mut faces = name_boundary(&whole, &walls, self.edge);
+        faces.extend(inner_faces(&whole, in_slit).into_iter().map(|t| (t, SHEET)));
         let naming = Naming {
-            walls: &walls,
             kinds: &[Kind::Skin, Kind::Bone, Kind::Bone, Kind::Free, Kind::Cut],
             bones: &[Bone { name: "skull", field: &skull }, Bone { name: "mandible", field: &mandible }],
-            edge: self.edge,
             apart: &|_| self.edge,
-            slit: Some(&in_slit),
             is_outer: &|_| true,
         };
-        let Assembled { mut mesh, slit_nodes, .. } = assemble(whole, &naming);
+        let Assembled { mut mesh, slit_nodes, .. } = assemble(whole, &faces, &naming);
         let depth = |p: &Vec3| (-skin(p), skull(p).min(mandible(p)).min(cavity(p)));
         self.layers.label(&mut mesh, &depth, &|_| None);
         let mesh = mesh.checked()?;
@@ -200,6 +202,23 @@ impl Head {
     }
 }
 
+/// Inner faces that are part of the slit, by their corners and the middles of the tetrahedra on both sides.
+fn inner_faces(mesh: &Stuffed, in_slit: impl Fn([Vec3; 3], Vec3, Vec3) -> bool) -> Vec<[u32; 3]> {
+    let adjacent = neighbours(&mesh.tets);
+    let at = |a: u32| mesh.nodes[a as usize];
+    let middle = |e: usize| mesh.tets[e].map(at).into_iter().sum::<Vec3>() / 4.0;
+    let mut out = Vec::new();
+    for (e, tet) in mesh.tets.iter().enumerate() {
+        for f in (0..4).filter(|&f| adjacent[e][f] != OPEN && adjacent[e][f] as usize > e) {
+            let t = FACES[f].map(|a| tet[a]);
+            if in_slit(t.map(at), middle(e), middle(adjacent[e][f] as usize)) {
+                out.push(t);
+            }
+        }
+    }
+    out
+}
+
 /// A half with its image in x = 0; nodes in that plane are shared.
 fn mirrored(half: &Stuffed) -> Stuffed {
     let mut whole = half.clone();
@@ -214,6 +233,7 @@ fn mirrored(half: &Stuffed) -> Stuffed {
             }
             whole.nodes.push(Vec3::new(-x.x, x.y, x.z));
             whole.wall.push(wall);
+            whole.plane.push(0);
             whole.nodes.len() as u32 - 1
         })
         .collect();

@@ -102,6 +102,40 @@ impl MeshReport {
         report
     }
 
+    /// The figures as a JSON object, lengths in m, angles in degrees.
+    pub fn json(&self) -> String {
+        let surface = |s: &SurfaceFigures| {
+            format!(
+                "{{\"name\": \"{}\", \"area\": {}, \"mean\": {}, \"p95\": {}, \"max\": {}, \"cover\": {}}}",
+                s.name,
+                s.area,
+                s.mean,
+                s.p95,
+                s.max,
+                s.cover.map_or("null".into(), |c| c.to_string())
+            )
+        };
+        let surfaces: Vec<String> = self.surfaces.iter().map(surface).collect();
+        format!(
+            "{{\"nodes\": {}, \"tets\": {}, \"inverted\": {}, \"degenerate\": {}, \"duplicate_nodes\": {}, \
+             \"pinched_edges\": {}, \"pinched_nodes\": {}, \"components\": {}, \"dihedral\": {:?}, \"radius_ratio\": {:?}, \
+             \"volume\": {}, \"wanted_volume\": {}, \"surfaces\": [{}]}}",
+            self.nodes,
+            self.tets,
+            self.inverted,
+            self.degenerate,
+            self.duplicate_nodes,
+            self.pinched_edges,
+            self.pinched_nodes,
+            self.components,
+            self.dihedral,
+            self.radius_ratio,
+            self.volume,
+            self.wanted_volume.map_or("null".into(), |v| v.to_string()),
+            surfaces.join(", ")
+        )
+    }
+
     /// Whether the mesh is sound: nothing inverted, degenerate, doubled or pinched, and one piece.
     pub fn is_sound(&self) -> bool {
         let faults = [self.inverted, self.degenerate, self.duplicate_nodes, self.pinched_edges, self.pinched_nodes];

@@ -78,6 +78,7 @@ fn part_nodes(mesh: &mut Stuffed, report: &mut Repair) {
             let copy = mesh.nodes.len() as u32;
             mesh.nodes.push(mesh.nodes[node].lerp(&centre, PART));
             mesh.wall.push(mesh.wall[node]);
+            mesh.plane.push(mesh.plane[node]);
             for e in mine {
                 mesh.tets[e].iter_mut().filter(|a| **a == node as u32).for_each(|a| *a = copy);
             }
@@ -132,6 +133,8 @@ pub(super) fn compact(mesh: &mut Stuffed) -> Vec<u32> {
     mesh.nodes.retain(|_| used.next() == Some(true));
     let mut used = new.iter().map(|&n| n != u32::MAX);
     mesh.wall.retain(|_| used.next() == Some(true));
+    let mut used = new.iter().map(|&n| n != u32::MAX);
+    mesh.plane.retain(|_| used.next() == Some(true));
     mesh.tets.iter_mut().for_each(|t| *t = t.map(|a| new[a as usize]));
     new
 }

@@ -21,6 +21,8 @@ pub struct Stuffed {
     pub nodes: Vec<Vec3>,
     /// Wall that holds each node, [`NO_WALL`] inside.
     pub wall: Vec<u8>,
+    /// Faces of the box that each node lies in: bit 2a for the low face along axis a, 2a + 1 for the high one.
+    pub plane: Vec<u8>,
     /// Corners of each tetrahedron, positive volume.
     pub tets: Vec<[u32; 4]>,
 }
@@ -54,6 +56,7 @@ impl Stencils<'_> {
     fn add(&mut self, x: Vec3, wall: u8) -> u32 {
         self.out.nodes.push(x);
         self.out.wall.push(wall);
+        self.out.plane.push(0);
         self.out.nodes.len() as u32 - 1
     }
 

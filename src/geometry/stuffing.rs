@@ -49,6 +49,12 @@ impl Wall<'_> {
         if self.side == Side::Inside { self.field.at(p) } else { -self.field.at(p) }
     }
 
+    /// [`Wall::depth`] and its gradient.
+    pub fn slope(&self, p: &Vec3) -> (f64, Vec3) {
+        let (d, slope) = self.field.slope(p);
+        if self.side == Side::Inside { (d, slope) } else { (-d, -slope) }
+    }
+
     fn level(&self, p: &Vec3) -> f64 {
         if self.side == Side::Inside { self.field.level(p) } else { -self.field.level(p) }
     }

@@ -46,7 +46,7 @@ pub fn stuff(walls: &[Wall], lattice: &Lattice) -> Result<Stuffing, MeshingError
 }
 
 /// The wall of each boundary triangle: its corners' own if they agree, else the wall nearest to its middle.
-fn name_boundary(mesh: &Stuffed, walls: &[Wall], edge: f64) -> Vec<([u32; 3], u8)> {
+pub(super) fn name_boundary(mesh: &Stuffed, walls: &[Wall], edge: f64) -> Vec<([u32; 3], u8)> {
     let name = |t: [u32; 3]| {
         let [a, b, c] = t.map(|a| mesh.wall[a as usize]);
         if a == b && b == c && a != NO_WALL {

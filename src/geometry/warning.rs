@@ -1,6 +1,5 @@
-//! What to beware of in a baked mesh: thin tissue by place, a jaw that hangs on, pieces left out.
+//! What to beware of in a baked mesh: thin tissue, a jaw that hangs on, pieces left out.
 
-use std::collections::BTreeMap;
 use std::fmt;
 
 use super::anatomy::Check;
@@ -8,32 +7,19 @@ use super::label::LayerShare;
 use super::{Cuboid, Distance, Field, Nearest, Surface, doubled_area};
 use crate::math::Vec3;
 
-/// Tissue thinner than this many lattice edges is warned of.
-const THIN: f64 = 2.0;
-/// Thin places are gathered over cells of this size, m; the worst ones are told.
-const THIN_CELL: f64 = 0.02;
-const THIN_TOLD: usize = 12;
-
 /// Something the user should know about a mesh that was made.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
-    /// Tissue thinner than the lattice resolves: missing, or thickened into the bone.
+    /// Tissue thinner than the finest cells of the lattice: it may be missing from the mesh.
     Thin {
         /// Thinnest place, LPS, m.
         place: Vec3,
         /// Thickness there, m.
         thickness: f64,
-        /// Skin area about it that is thinner than twice the edge, m2.
+        /// Skin area over such tissue, m2.
         area: f64,
-        /// Whether the mesh was thickened there.
-        thickened: bool,
-    },
-    /// More thin places than were told one by one.
-    MoreThin {
-        /// How many.
-        places: usize,
-        /// Their skin area, m2.
-        area: f64,
+        /// The finest cells, m.
+        finest: f64,
     },
     /// Skull and mandible hang together: the jaw cannot move.
     JawNotFound,
@@ -94,17 +80,20 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Thin { place, thickness, area, thickened } => {
+            Self::Thin { place, thickness, area, finest } => {
                 let p = place * 1e3;
-                let (t, a) = (thickness * 1e3, area * 1e4);
-                let fate = if *thickened { "the mesh is thicker there than the tissue" } else { "it may be missing" };
                 write!(
                     f,
-                    "thin tissue: {t:.1} mm at ({:.1}, {:.1}, {:.1}) mm LPS, {a:.1} cm2 about it; {fate}: choose a shorter edge",
-                    p.x, p.y, p.z
+                    "{:.1} cm2 of skin cover tissue thinner than the finest cells ({:.1} mm), which may be missing: \
+                     {:.2} mm at ({:.1}, {:.1}, {:.1}) mm LPS at the thinnest",
+                    area * 1e4,
+                    finest * 1e3,
+                    thickness * 1e3,
+                    p.x,
+                    p.y,
+                    p.z
                 )
             }
-            Self::MoreThin { places, area } => write!(f, "thin tissue at {places} more places, {:.1} cm2", area * 1e4),
             Self::JawNotFound => write!(
                 f,
                 "skull and mandible could not be told apart: all bone is `skull`, the jaw cannot move; give --labels, or \
@@ -169,8 +158,8 @@ pub(super) struct Under<'a> {
 }
 
 impl Under<'_> {
-    /// Thickness under the middle of a skin triangle, and whether bone bounds it; infinite beyond `reach`.
-    fn thickness(&self, corners: [Vec3; 3], reach: f64) -> (f64, bool) {
+    /// Thickness under the middle of a skin triangle, to bone or to air; infinite beyond `reach`.
+    fn thickness(&self, corners: [Vec3; 3], reach: f64) -> f64 {
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         let bone = self.to_bone.at(&middle).max(0.0);
         let air = self.bins.distance(&middle, reach).filter(|(_, t)| {
@@ -178,43 +167,27 @@ impl Under<'_> {
             let (a, b) = (doubled_area(corners), doubled_area(self.inner.corners(*t)));
             a.dot(&b) < -0.5 * a.norm() * b.norm()
         });
-        match air {
-            Some((air, _)) if air < bone => (air, false),
-            _ => (bone, true),
-        }
+        air.map_or(bone, |(air, _)| air.min(bone))
     }
 }
 
-/// Places where tissue is thinner than the lattice resolves, worst first.
-pub(super) fn thin(skin: &Surface, under: &Under, edge: f64, thicken: bool, within: &Cuboid) -> Vec<Warning> {
-    let limit = THIN * edge;
-    let mut cells: BTreeMap<[i64; 3], Warning> = BTreeMap::new();
+/// Tissue under the outer skin that is thinner than the finest cells of the lattice.
+pub(super) fn thin(skin: &Surface, under: &Under, finest: f64, within: &Cuboid) -> Option<Warning> {
+    let (mut all, mut thinnest) = (0.0, (f64::INFINITY, Vec3::zeros()));
     for t in 0..skin.triangles.len() {
         let corners = skin.corners(t);
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         if within.at(&middle) > 0.0 {
             continue;
         }
-        let (found, on_bone) = under.thickness(corners, limit);
-        if found >= limit {
-            continue;
-        }
-        let key = [0, 1, 2].map(|a| (middle[a] / THIN_CELL).floor() as i64);
-        let fresh = Warning::Thin { place: middle, thickness: f64::INFINITY, area: 0.0, thickened: false };
-        if let Warning::Thin { place, thickness, area, thickened } = cells.entry(key).or_insert(fresh) {
-            *area += doubled_area(corners).norm() / 2.0;
-            if found < *thickness {
-                (*place, *thickness, *thickened) = (middle, found, on_bone && thicken);
+        let found = under.thickness(corners, finest);
+        if found < finest {
+            all += doubled_area(corners).norm() / 2.0;
+            if found < thinnest.0 {
+                thinnest = (found, middle);
             }
         }
     }
-    let size =
-        |w: &Warning| if let Warning::Thin { thickness, area, .. } = w { (*thickness, *area) } else { (0.0, 0.0) };
-    let mut warnings: Vec<Warning> = cells.into_values().collect();
-    warnings.sort_by(|p, q| size(p).0.total_cmp(&size(q).0));
-    let rest = warnings.split_off(warnings.len().min(THIN_TOLD));
-    if !rest.is_empty() {
-        warnings.push(Warning::MoreThin { places: rest.len(), area: rest.iter().map(|w| size(w).1).sum() });
-    }
-    warnings
+    let (thickness, place) = thinnest;
+    (all > 0.0).then_some(Warning::Thin { place, thickness, area: all, finest })
 }

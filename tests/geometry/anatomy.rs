@@ -1,6 +1,6 @@
 //! Bones, hinge and checks over a family of heads: what is found is right, what cannot be is told.
 use cutis::geometry::anatomy::{About, Anatomy, Hints, anatomy};
-use cutis::geometry::{BakeOptions, Grid, Labels, MeshingError, Volume, Warning, bake};
+use cutis::geometry::{BakeOptions, Grid, Labels, MeshingError, Resolution, Volume, Warning, bake};
 use cutis::io::{LabelMap, read_labels, read_volume};
 use cutis::math::{Mat3, Vec3};
 
@@ -37,6 +37,11 @@ fn right(head: &Head, what: &str) -> Anatomy {
     assert!(s.both >= 0.98 && s.surface >= 0.975, "{what}: {s}");
     assert!(r.max(l) <= 5.0 && m <= 3.0, "{what}: {r} {l} {m}");
     found
+}
+
+/// A mesh of large errors, which says as much of bones as a fine one.
+fn coarse() -> Resolution {
+    Resolution { edge: 9e-3, skin_error: Some(0.4 * MM), bone_error: Some(1.0 * MM), ..Resolution::default() }
 }
 
 #[test]
@@ -127,7 +132,7 @@ fn scanned_head_comes_apart_in_release() {
 #[test]
 fn hints_are_taken_in_release() {
     let head = Phantom { bite: 2.0, ..Phantom::default() }.head();
-    let plain = BakeOptions { edge: 9e-3, ..BakeOptions::default() };
+    let plain = BakeOptions { resolution: coarse(), ..BakeOptions::default() };
     let with = |hints: Hints| bake(&head.volume, None, &BakeOptions { hints, ..plain.clone() }, &mut |_, _| {});
     // A seed in the upper jaw's bone claims what it lies in.
     let place = Vec3::new(46.0, -58.0, -3.0) * MM;
@@ -183,16 +188,16 @@ fn seeds_alone_part_what_looks_like_no_jaw() {
         }
     });
     let volume = Volume { samples: samples.collect(), grid };
-    let plain = BakeOptions { edge: 9e-3, ..BakeOptions::default() };
+    let plain = BakeOptions { resolution: coarse(), ..BakeOptions::default() };
     let run = |options: &BakeOptions| bake(&volume, None, options, &mut |_, _| {});
     let none = run(&plain).unwrap();
-    assert!(none.warnings.contains(&Warning::JawNotFound) && none.mesh.node_set("mandible").is_none());
+    assert!(none.warnings.contains(&Warning::JawNotFound) && none.finest.mesh.node_set("mandible").is_none());
     assert!(matches!(run(&BakeOptions { strict: true, ..plain.clone() }), Err(MeshingError::Doubtful { .. })));
     let seed = |bone: &str, z: f64, y: f64| (bone.to_owned(), Vec3::new(0.0, y, z) * MM);
     let hints = Hints { seeds: vec![seed("skull", 22.0, 10.0), seed("mandible", -30.0, -10.0)], ..Hints::default() };
     let parted = run(&BakeOptions { hints, ..plain }).unwrap();
-    let jaw = parted.mesh.node_set("mandible").unwrap();
-    assert!(jaw.nodes.iter().all(|&a| parted.mesh.nodes[a as usize].z < -10.0 * MM));
+    let jaw = parted.finest.mesh.node_set("mandible").unwrap();
+    assert!(jaw.nodes.iter().all(|&a| parted.finest.mesh.nodes[a as usize].z < -10.0 * MM));
     assert!(parted.warnings.iter().any(|w| matches!(w, Warning::Bones { given: true, .. })));
 }
 

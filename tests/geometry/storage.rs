@@ -1,6 +1,6 @@
 //! Region and face of a scan do not depend on how its voxels are stored; labels are taken as they are, or told.
 use cutis::geometry::head::{mandible, skin, skull};
-use cutis::geometry::{BakeOptions, Baked, Grid, Labels, MeshingError, Volume, Warning, bake};
+use cutis::geometry::{BakeOptions, Baked, Grid, Labels, MeshingError, Resolution, Volume, Warning, bake};
 use cutis::io::{LabelMap, read_labels, read_volume, write_labels};
 use cutis::math::{Mat3, Vec3};
 
@@ -69,7 +69,9 @@ pub fn write(volume: &Volume, name: &str, ras: bool) -> std::path::PathBuf {
 }
 
 fn options() -> BakeOptions {
-    BakeOptions { edge: 8e-3, ..BakeOptions::default() }
+    let errors = [Some(0.4e-3), Some(1e-3)];
+    let resolution = Resolution { edge: 8e-3, skin_error: errors[0], bone_error: errors[1], ..Resolution::default() };
+    BakeOptions { resolution, ..BakeOptions::default() }
 }
 
 fn baked(volume: &Volume, labels: Option<&Labels>) -> Baked {
@@ -78,7 +80,7 @@ fn baked(volume: &Volume, labels: Option<&Labels>) -> Baked {
 
 /// The same mesh, its nodes to round-off.
 fn alike(found: &Baked, wanted: &Baked, what: &str) {
-    let (a, b) = (&found.mesh, &wanted.mesh);
+    let (a, b) = (&found.finest.mesh, &wanted.finest.mesh);
     assert!(a.tets == b.tets && a.region == b.region, "{what}: {} and {} tetrahedra", a.tets.len(), b.tets.len());
     assert!(a.node_sets == b.node_sets && a.face_sets == b.face_sets, "{what}");
     let apart = a.nodes.iter().zip(&b.nodes).map(|(x, y)| (x - y).norm()).fold(0.0, f64::max);
@@ -95,7 +97,7 @@ fn region_and_face_are_the_same_however_voxels_are_stored() {
     let wanted = baked(&read_volume(&write(&scan, "stored.nrrd", false), &mut Vec::new()).unwrap(), None);
     // Its jaw is a sketch, a solid arch: that is told, and nothing is moved that is no jaw.
     assert!(wanted.warnings.contains(&Warning::JawNotFound) && wanted.condyles.is_none());
-    assert!(wanted.mesh.node_set("mandible").is_none());
+    assert!(wanted.finest.mesh.node_set("mandible").is_none());
     let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     for (k, order) in orders.into_iter().enumerate() {
         for turned in [[k % 2 == 0, k % 3 != 1, k > 2], [true, false, true]] {
@@ -104,13 +106,15 @@ fn region_and_face_are_the_same_however_voxels_are_stored() {
             alike(&baked(&read, None), &wanted, &format!("axes {order:?}, turned {turned:?}"));
         }
     }
-    // The head is symmetric, and so is what is found in it: the foremost voxels lie on both sides of the median plane.
-    let x = wanted.mesh.nodes.iter().map(|p| p.x);
+    // The head is symmetric, and so is the region found in it, but for where edges were collapsed: the foremost voxels lie on
+    // both sides of the median plane.
+    let x = wanted.finest.mesh.nodes.iter().map(|p| p.x);
     let (right, left) = (x.clone().fold(f64::INFINITY, f64::min), x.fold(f64::NEG_INFINITY, f64::max));
-    assert!((right + left).abs() < 1e-9, "{right} {left}");
+    assert!((right + left).abs() < 0.5e-3, "{right} {left}");
 }
 
-/// Round-off of an orientation in single precision turns the volume by 1e-7: that must not choose a nose tip.
+/// Round-off of an orientation in single precision turns the volume by 1e-7: that must not choose a nose tip, which would
+/// move the region by millimetres. It may choose which edges collapse.
 #[test]
 fn round_off_of_the_orientation_moves_nothing() {
     let scan = scan();
@@ -119,8 +123,8 @@ fn round_off_of_the_orientation_moves_nothing() {
         let turn = nalgebra::Rotation3::from_axis_angle(&Vec3::z_axis(), angle).into_inner();
         let grid = Grid { direction: turn, ..scan.grid.clone() };
         let found = baked(&Volume { grid, samples: scan.samples.clone() }, None);
-        let x = |b: &Baked| b.mesh.nodes.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
-        assert!((x(&found) - x(&wanted)).abs() < 1e-6, "{} {}", x(&found), x(&wanted));
+        let x = |b: &Baked| b.finest.mesh.nodes.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
+        assert!((x(&found) - x(&wanted)).abs() < 0.2e-3, "{} {}", x(&found), x(&wanted));
     }
 }
 
@@ -134,7 +138,7 @@ fn labels(volume: &Volume, numbers: [u8; 2]) -> Labels {
 }
 
 fn nodes(baked: &Baked, name: &str) -> usize {
-    baked.mesh.node_set(name).map_or(0, |s| s.nodes.len())
+    baked.finest.mesh.node_set(name).map_or(0, |s| s.nodes.len())
 }
 
 #[test]
