@@ -149,7 +149,7 @@ impl Head {
             let flat = corners.iter().all(|c| c.z.abs() < 1e-3 * self.edge && c.x.abs() < MOUTH + 0.25 * self.edge);
             flat && a.z * b.z < 0.0 && corners.iter().all(|c| c.y < TEETH)
         };
-        let mut faces = name_boundary(&whole, &walls, self.edge);
+        let mut faces = name_boundary(&whole, &walls, 0.3 * self.edge);
         faces.extend(inner_faces(&whole, in_slit).into_iter().map(|t| (t, SHEET)));
         let naming = Naming {
             kinds: &[Kind::Skin, Kind::Bone, Kind::Bone, Kind::Free, Kind::Cut],

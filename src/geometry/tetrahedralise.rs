@@ -41,12 +41,12 @@ pub fn stuff(walls: &[Wall], lattice: &Lattice) -> Result<Stuffing, MeshingError
         let names = walls.iter().map(|w| w.name).collect::<Vec<_>>().join(", ");
         return Err(MeshingError::NoTissue { walls: names, edge: lattice.edge });
     }
-    let boundary = name_boundary(&mesh, walls, lattice.edge);
+    let boundary = name_boundary(&mesh, walls, 0.5 * lattice.edge);
     Ok(Stuffing { mesh, boundary, repair })
 }
 
-/// The wall of each boundary triangle: its corners' own if they agree, else the wall nearest to its middle.
-pub(super) fn name_boundary(mesh: &Stuffed, walls: &[Wall], edge: f64) -> Vec<([u32; 3], u8)> {
+/// The wall of each boundary triangle: its corners' own if they agree, else the wall nearest to its middle within `reach`, m.
+pub(super) fn name_boundary(mesh: &Stuffed, walls: &[Wall], reach: f64) -> Vec<([u32; 3], u8)> {
     let name = |t: [u32; 3]| {
         let [a, b, c] = t.map(|a| mesh.wall[a as usize]);
         if a == b && b == c && a != NO_WALL {
@@ -55,7 +55,7 @@ pub(super) fn name_boundary(mesh: &Stuffed, walls: &[Wall], edge: f64) -> Vec<([
         let middle: Vec3 = t.iter().map(|&a| mesh.nodes[a as usize]).sum::<Vec3>() / 3.0;
         let distance = |w: &Wall| w.depth(&middle).abs();
         let nearest = (0..walls.len()).map(|w| (distance(&walls[w]), w)).min_by(|p, q| p.0.total_cmp(&q.0));
-        nearest.filter(|(d, _)| *d < 0.5 * edge).map_or(NO_WALL, |(_, w)| w as u8)
+        nearest.filter(|(d, _)| *d < reach).map_or(NO_WALL, |(_, w)| w as u8)
     };
     let triangles = boundary(&mesh.tets, &neighbours(&mesh.tets));
     triangles.into_iter().map(|(t, _)| (t, name(t))).collect()
