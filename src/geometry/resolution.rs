@@ -27,6 +27,8 @@ const DEEP: [f64; 2] = [0.012, 0.010];
 const LEVEL: f64 = 1.6;
 /// Where a number of tetrahedra is asked for, edges start at this share of those asked for and grow by the second.
 const SEARCH: [f64; 2] = [0.6, 1.35];
+/// Share of them that collapse may leave: swaps and free nodes between bones add some.
+const SPARE: f64 = 0.97;
 /// An edge grows this often at most on the way to a number of tetrahedra.
 const SEARCHES: usize = 12;
 /// Most that given errors may coarsen the lattice: twice the cells.
@@ -155,7 +157,7 @@ pub(super) fn level(
             coarsen(times, 0);
         }
         Some(tets) => {
-            let target = (tets as f64 / times.powf(2.0)) as usize;
+            let target = (SPARE * tets as f64 / (times * times)) as usize;
             let mut share = SEARCH[0];
             for _ in 0..SEARCHES {
                 if coarsen(share * times, target) <= target {

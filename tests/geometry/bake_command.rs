@@ -33,8 +33,12 @@ fn settings_hints_and_labels_of_the_command_line_in_release() {
     assert!(!plain.contains("not to be trusted") && !plain.contains("settings from"), "{plain}");
     let (good, again) = bake(&moved, &["-l", labels.to_str().unwrap()]);
     assert!(good && again.contains("pivot = ") && !again.contains("do the labels"), "{again}");
-    let nodes = |text: &str| text.lines().find(|l| l.starts_with("bone mandible")).map(str::to_owned);
-    assert_eq!(nodes(&plain), nodes(&again));
+    // The same bone, but for where edges were collapsed at ties.
+    let nodes = |text: &str| {
+        let line = text.lines().find(|l| l.starts_with("bone mandible")).expect("the mandible was found");
+        line.split_whitespace().nth(2).and_then(|n| n.parse::<f64>().ok()).expect("a number of nodes")
+    };
+    assert!((nodes(&again) / nodes(&plain) - 1.0).abs() < 0.05, "{plain}{again}");
 
     std::fs::write(&settings, "hinge = [[-40, 10, 20], [40, 10, 20]]\n[seeds]\nmandible = [[0, -76, -70]]\n").unwrap();
     let (good, text) = bake(&moved, &[]);
