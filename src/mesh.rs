@@ -129,8 +129,8 @@ pub enum MeshError {
 /// Volumes below this share of the cube of the longest edge are rounding: such an element has no inverse.
 const FLAT: f64 = 1e-15;
 
-/// Faces of a tetrahedron by its corners, wound outward.
-pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+/// Faces of a tetrahedron by its corners, each opposite the corner of the same number, wound outward.
+pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// The same numbers in ascending order.
 pub(crate) fn sorted<const N: usize>(mut nodes: [u32; N]) -> [u32; N] {

@@ -13,13 +13,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use cutis::geometry::BONES;
 use cutis::io;
 use cutis::math::Vec3;
 
 /// Its name beside a scan.
 pub const NAME: &str = "bake.toml";
-/// Bones that a seed may show.
-const BONES: [&str; 4] = ["skull", "mandible", "spine", "hyoid"];
 const MILLI: f64 = 1e-3;
 
 type Place = [f64; 3];

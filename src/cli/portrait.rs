@@ -1,7 +1,7 @@
 //! A picture of a baked mesh: the skin, the bones under it, and a cut through the middle.
 
 use cutis::math::Vec3;
-use cutis::mesh::{SKIN, TetMesh};
+use cutis::mesh::{FACES, SKIN, TetMesh};
 use cutis::view::{Camera, Image, Rgb, Surface, draw};
 
 const PANEL: (usize, usize) = (480, 560);
@@ -11,8 +11,6 @@ const INNER: Rgb = [0.72, 0.45, 0.42];
 /// Bones in the order of their node sets, and layers in that of the regions.
 const BONES: [Rgb; 4] = [[0.90, 0.87, 0.76], [0.58, 0.74, 0.88], [0.60, 0.80, 0.62], [0.86, 0.72, 0.88]];
 const LAYERS: [Rgb; 4] = [[0.89, 0.72, 0.62], [0.95, 0.86, 0.55], [0.78, 0.42, 0.38], [0.70, 0.60, 0.75]];
-/// Faces of a tetrahedron, wound outward.
-const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// Triangles and their colour.
 type Parts<'a> = Vec<(&'a [[u32; 3]], Rgb)>;

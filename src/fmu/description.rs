@@ -8,6 +8,7 @@ use quick_xml::Writer;
 
 use super::{FmiVersion, LOG_CATEGORIES, MODEL_IDENTIFIER, scalar_name, scalar_reference, token};
 use crate::load::Loaded;
+use crate::math::extent;
 use crate::port::{Causality, Port, Slot, Type};
 use crate::sim::Model;
 
@@ -71,9 +72,7 @@ const TERMINALS: &[(&str, &str, &str, &str)] = &[
 
 /// Tolerance of the solver in sizes of the tissue.
 fn relative_tolerance(model: &Model) -> f64 {
-    let nodes = &model.mesh().nodes;
-    let (low, high) = nodes.iter().fold((nodes[0], nodes[0]), |(l, h), x| (l.inf(x), h.sup(x)));
-    let relative = model.parts().strategy.tolerance / (high - low).norm();
+    let relative = model.parts().strategy.tolerance / extent(&model.mesh().nodes);
     // One digit says it.
     format!("{relative:.0e}").parse().unwrap_or(relative)
 }

@@ -7,7 +7,7 @@ use super::stencils::Stuffed;
 use super::stuffing::NO_WALL;
 use super::topology::{FACES, OPEN, boundary, components, fans, neighbours, pinched_edges, stars};
 use crate::math::Vec3;
-use crate::mesh::{FaceSet, NodeSet, SKIN, TetMesh};
+use crate::mesh::{FaceSet, NodeSet, SKIN, TetMesh, sorted};
 
 /// Face set where the region of interest ends.
 pub const CUT: &str = "cut";
@@ -108,10 +108,6 @@ const INNER: u8 = SHEET - 1;
 
 /// The wall of each tetrahedron's faces.
 fn walls_of(tets: &[[u32; 4]], faces: &[Face]) -> Vec<[u8; 4]> {
-    let sorted = |mut t: [u32; 3]| {
-        t.sort_unstable();
-        t
-    };
     let mut listed: Vec<Face> = faces.iter().map(|&(t, wall)| (sorted(t), wall)).collect();
     listed.sort_unstable();
     let of = |t: [u32; 3]| listed.binary_search_by_key(&sorted(t), |f| f.0).map_or(INNER, |k| listed[k].1);

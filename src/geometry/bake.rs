@@ -36,15 +36,13 @@ const MOUTH: [f64; 3] = [0.0, 0.015, -0.032];
 const JOINT: f64 = 6e-3;
 /// Hounsfield units below which tissue under the skin is fat.
 const FAT_HU: f64 = -10.0;
-/// Polish before the mesh is coarsened.
+/// Polish before the mesh is parted, after it was, and after edges between bones were split.
 const FIRST: Effort = Effort { rounds: 3, all: 1, swaps: 0, rescue: 1, fit: 0 };
-/// After edges were split.
-const SPLIT: Effort = Effort { rounds: 1, all: 0, swaps: 0, rescue: 6, fit: 0 };
-/// And after it was parted.
 const PARTED: Effort = Effort { rounds: 1, all: 0, swaps: 2, rescue: 1, fit: 0 };
+const SPLIT: Effort = Effort { rounds: 1, all: 0, swaps: 0, rescue: 6, fit: 0 };
 /// Where the foremost skin is further than this from the tip of the nose, the head is turned, m.
 const TURNED: f64 = 0.02;
-/// Search reach for a second bone, m: beyond the crowns of the teeth.
+/// Search reach for a second bone, m: beyond the crowns of the teeth and the joint's capsule.
 const NEAR: f64 = 0.013;
 
 /// How to bake.
@@ -182,8 +180,7 @@ pub fn bake(
     let bone_surfaces = split_bones(&part, &to_bone.surface, &map);
     let bins: Vec<Nearest> = bone_surfaces.iter().map(|s| Nearest::new(s, 4e-3)).collect();
     // Names only ask whether a second bone is nearer than the joint's capsule, or than the crowns of the teeth.
-    let near: Vec<_> =
-        bins.iter().map(|b| move |p: &Vec3| b.distance(p, NEAR.max(JOINT)).map_or(NEAR.max(JOINT), |d| d.0)).collect();
+    let near: Vec<_> = bins.iter().map(|b| move |p: &Vec3| b.distance(p, NEAR).map_or(NEAR, |d| d.0)).collect();
     let mouth = mouth(options, &bone_surfaces, &nose, found.commissures, told);
     progress("tetrahedra", 0.5);
     let grid = cubic(region.low - Vec3::repeat(SPACING), region.high + Vec3::repeat(SPACING), SPACING);
@@ -202,7 +199,7 @@ pub fn bake(
     };
     let fine = options.resolution.fineness();
     let detail = Detail {
-        tolerance: &options.resolution.lattice_errors(),
+        tolerance: options.resolution.lattice_errors(),
         cap: CAP * fine,
         scale: &|p| places.scale(p),
         floor: FINEST * fine,

@@ -2,10 +2,9 @@
 
 use super::anatomy::watershed;
 use super::{Labels, Volume};
-use crate::math::Vec3;
 
-/// Names of the bones, numbered from 1 in a bone map.
-pub(super) const BONES: [&str; 4] = ["skull", "mandible", "spine", "hyoid"];
+/// Names of the bones that a bake knows, numbered from 1 in a bone map.
+pub const BONES: [&str; 4] = ["skull", "mandible", "spine", "hyoid"];
 /// Their numbers in a labels file.
 pub(super) const LABELS: [u8; 4] = [2, 3, 4, 6];
 pub(super) const SKULL: u8 = 1;
@@ -23,11 +22,7 @@ pub(super) fn bone_of(label: u8) -> u8 {
 pub(super) fn bone_map(volume: &Volume, bone: f64, labels: Option<&Labels>) -> (Vec<u8>, bool) {
     let grid = &volume.grid;
     let is_bone = |at: usize| f64::from(volume.samples[at]) >= bone;
-    let position = |at: usize| {
-        let [nx, ny, _] = grid.dims;
-        grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64))
-    };
-    let of = |at: usize| labels.map_or(SKULL, |labels| bone_of(labels.at(&position(at))));
+    let of = |at: usize| labels.map_or(SKULL, |labels| bone_of(labels.at(&grid.place(at))));
     let mut map: Vec<u8> = (0..grid.len()).map(|at| if is_bone(at) { of(at) } else { 0 }).collect();
     let told = map.contains(&SKULL) && map.contains(&MANDIBLE);
     watershed(grid, |at| volume.samples[at], is_bone, &mut map);

@@ -95,6 +95,11 @@ pub(super) fn components(grid: &Grid, pass: impl Fn(usize) -> bool) -> (Vec<u32>
     (number, sizes)
 }
 
+/// The largest of some components by their sizes, the first of equals.
+pub(super) fn largest(sizes: &[usize]) -> Option<usize> {
+    (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k))
+}
+
 /// Grows a region by `radius` metres.
 fn grow(grid: &Grid, region: &[bool], radius: f64) -> Vec<bool> {
     let mut grown = region.to_vec();
@@ -131,7 +136,7 @@ fn grow(grid: &Grid, region: &[bool], radius: f64) -> Vec<bool> {
 /// Keeps the largest connected body at or above `iso`; loose parts become air.
 pub(super) fn one_body(volume: &mut Volume, iso: f64) {
     let (number, sizes) = components(&volume.grid, |at| f64::from(volume.samples[at]) >= iso);
-    let Some(largest) = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k)) else { return };
+    let Some(largest) = largest(&sizes) else { return };
     for (s, &n) in volume.samples.iter_mut().zip(&number) {
         if n != 0 && n as usize != largest + 1 {
             *s = AIR;
@@ -165,7 +170,7 @@ pub(super) fn solid_bones(volume: &mut Volume, bone: f64, to_bone: &Distance) ->
     let wide = |at: usize| f64::from(volume.samples[at]) < bone && f64::from(to_bone.values[at]) > BONE_REACH;
     // Open is what the largest wide region (the air and the flesh of the face) leads to.
     let (number, sizes) = components(grid, wide);
-    let Some(largest) = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k)) else { return 0 };
+    let Some(largest) = largest(&sizes) else { return 0 };
     let open: Vec<bool> = number.iter().map(|&n| n as usize == largest + 1).collect();
     let grown = grow(grid, &open, BONE_REACH + REGROW * grid.spacing.mean());
     let closed: Vec<usize> = (0..grid.len()).filter(|&at| tissue(at) && !grown[at]).collect();
@@ -181,11 +186,10 @@ pub(super) fn solid_bones(volume: &mut Volume, bone: f64, to_bone: &Distance) ->
 pub(super) fn outer_air(volume: &Volume, skin: f64, to_skin: &Distance) -> Vec<bool> {
     let grid = &volume.grid;
     let air = |at: usize| f64::from(volume.samples[at]) < skin && f64::from(to_skin.values[at]) > AIR_REACH;
-    let [nx, ny, nz] = grid.dims;
-    let y = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64)).y;
+    let y = |at: usize| grid.place(at).y;
     let front = (0..grid.len()).filter(|&at| air(at)).map(y).fold(f64::INFINITY, f64::min);
     let step = grid.spacing.max();
-    let seeds = (0..nx * ny * nz).filter(|&at| air(at) && y(at) < front + step);
+    let seeds = (0..grid.len()).filter(|&at| air(at) && y(at) < front + step);
     let reached = flood(grid, seeds, air);
     grow(grid, &reached, AIR_REACH + REGROW * step)
 }

@@ -68,9 +68,8 @@ pub(super) fn deep(part: &mut Volume, options: &BakeOptions, outer: &[bool], to_
 /// Signed distance to an isosurface on another grid: exact next to it, sampled further off.
 pub(super) fn resampled(grid: &Grid, volume: &Volume, iso: f64, distance: &Distance) -> Sampled {
     let mut values = band(grid, &distance.surface);
-    let [nx, ny, _] = grid.dims;
     for (at, d) in values.iter_mut().enumerate() {
-        let p = grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
+        let p = grid.place(at);
         if !d.is_finite() {
             *d = distance.at(&p) as f32;
         } else if volume.sample(&p) >= iso {
@@ -88,11 +87,7 @@ pub(super) fn split_bones(part: &Volume, surface: &Surface, map: &[u8]) -> [Surf
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         let ([i, j, k], _) = grid.cell(&middle);
         let around = (0..8).map(|c| grid.index([i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1)]));
-        let distance = |at: usize| {
-            let [nx, ny, _] = grid.dims;
-            let p = grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
-            (p - middle).norm_squared()
-        };
+        let distance = |at: usize| (grid.place(at) - middle).norm_squared();
         let nearest = around.filter(|&at| map[at] != 0).min_by(|&p, &q| distance(p).total_cmp(&distance(q)));
         nearest.map_or(0, |at| usize::from(map[at]) - 1)
     };
@@ -133,11 +128,9 @@ pub(super) fn reached(
     deep: &dyn Field,
 ) -> Vec<bool> {
     let grid = &part.grid;
-    let [nx, ny, _] = grid.dims;
-    let place = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
     let tissue = |at: usize| (options.skin_hu..options.bone_hu).contains(&f64::from(part.samples[at]));
     let inside = |at: usize| {
-        let p = place(at);
+        let p = grid.place(at);
         tissue(at) && region.at(&p) <= 0.0 && deep.at(&p) <= 0.0
     };
     let seeds = (0..grid.len()).filter(|&at| outer[at]);
@@ -148,11 +141,10 @@ pub(super) fn reached(
 /// Volume of samples inside a region, m3; those at its rim count with what lies inside.
 pub(super) fn volume_of(part: &Volume, reached: &[bool], region: &Cuboid) -> f64 {
     let grid = &part.grid;
-    let [nx, ny, _] = grid.dims;
     // Half the extent of a voxel along the world axes.
     let half = grid.direction.map(f64::abs) * grid.spacing / 2.0;
     let share = |at: usize| {
-        let p = grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
+        let p = grid.place(at);
         let overlap = (p + half).inf(&region.high) - (p - half).sup(&region.low);
         overlap.sup(&Vec3::zeros()).component_div(&(2.0 * half)).product()
     };

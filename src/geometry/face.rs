@@ -1,8 +1,7 @@
 //! Where things are in a head: the tip of the nose, the region of interest, the condyles, the mouth.
 
-use super::clean::components;
-use super::shapes::join;
-use super::slit::both;
+use super::clean::{components, largest};
+use super::shapes::{both, join};
 use super::{BakeOptions, Cuboid, Field, MeshingError, Surface, Volume};
 use crate::math::Vec3;
 
@@ -32,19 +31,19 @@ pub(super) fn empty(name: &'static str, iso: f64, volume: &Volume) -> MeshingErr
 /// The middle of the foremost layer of skin in the volume: the tip of the nose, if the face is in it.
 pub(super) fn nose_tip(volume: &Volume, options: &BakeOptions) -> Result<Vec3, MeshingError> {
     let grid = &volume.grid;
-    let [nx, ny, _] = grid.dims;
     let (number, sizes) = components(grid, |at| f64::from(volume.samples[at]) >= options.skin_hu);
-    let largest = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k));
+    let largest = largest(&sizes);
     let Some(largest) = largest.filter(|&k| sizes[k] < grid.len()) else {
         return Err(empty("skin", options.skin_hu, volume));
     };
     let body = (0..grid.len()).filter(|&at| number[at] as usize == largest + 1);
-    let place = |at: usize| grid.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64));
-    let front = body.clone().map(|at| place(at).y).fold(f64::INFINITY, f64::min);
+    let front = body.clone().map(|at| grid.place(at).y).fold(f64::INFINITY, f64::min);
     // All voxels of the layer count: which of them is the foremost by round-off, or the first stored, says nothing.
     let depth = LAYER * (0..3).map(|a| (grid.direction[(1, a)] * grid.spacing[a]).abs()).sum::<f64>();
-    let (n, sum) =
-        body.map(place).filter(|p| p.y < front + depth).fold((0usize, Vec3::zeros()), |(n, s), p| (n + 1, s + p));
+    let (n, sum) = body
+        .map(|at| grid.place(at))
+        .filter(|p| p.y < front + depth)
+        .fold((0usize, Vec3::zeros()), |(n, s), p| (n + 1, s + p));
     if n == 0 {
         return Err(empty("skin", options.skin_hu, volume));
     }

@@ -14,14 +14,7 @@ pub trait Field: Sync {
 
     /// Value and gradient at a world position; by differences unless a field knows better.
     fn slope(&self, p: &Vec3) -> (f64, Vec3) {
-        (
-            self.at(p),
-            Vec3::from_fn(|a, _| {
-                let mut step = Vec3::zeros();
-                step[a] = NEAR;
-                (self.at(&(p + step)) - self.at(&(p - step))) / (2.0 * NEAR)
-            }),
-        )
+        (self.at(p), gradient(self, p, NEAR))
     }
 }
 
@@ -66,7 +59,7 @@ impl Field for Cuboid {
 }
 
 /// Central difference of a field over `2 h`: its gradient, about a unit vector for a distance.
-pub fn gradient(field: &dyn Field, p: &Vec3, h: f64) -> Vec3 {
+pub fn gradient<F: Field + ?Sized>(field: &F, p: &Vec3, h: f64) -> Vec3 {
     Vec3::from_fn(|a, _| {
         let mut step = Vec3::zeros();
         step[a] = h;

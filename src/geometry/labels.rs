@@ -46,12 +46,10 @@ pub(super) fn usable(
         found: list(&found),
     }));
     let grid = &labels.grid;
-    let [nx, ny, _] = grid.dims;
     let (mut on_bone, mut all) = (0usize, 0usize);
     for at in (0..grid.len()).filter(|&at| LABELS.contains(&labels.ids[at])) {
-        let c = nalgebra::Vector3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
         all += 1;
-        on_bone += usize::from(volume.sample(&grid.world(&c)) >= bone);
+        on_bone += usize::from(volume.sample(&grid.place(at)) >= bone);
     }
     let share = on_bone as f64 / all.max(1) as f64;
     if share < ON_BONE {

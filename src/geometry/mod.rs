@@ -41,6 +41,7 @@ mod warning;
 pub use assemble::{CUT, FREE};
 pub use bake::{BakeOptions, Baked, Level, bake};
 pub use block::{Block, Pattern, block};
+pub use bones::BONES;
 pub use distance::{Distance, Isosurface, unsigned};
 pub use error::MeshingError;
 pub use field::{Ball, Cuboid, Field, gradient};

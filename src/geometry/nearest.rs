@@ -1,7 +1,7 @@
 //! Nearest point on a triangle surface, through a grid of bins.
 
 use super::{Surface, nearest_on_triangle};
-use crate::math::Vec3;
+use crate::math::{Vec3, bounds};
 
 /// Triangles sorted into the cells of a regular grid; answers distance queries.
 #[derive(Debug, Clone)]
@@ -19,8 +19,7 @@ pub struct Nearest<'a> {
 impl<'a> Nearest<'a> {
     /// Sorts a surface's triangles into cubic bins of edge `cell`, m.
     pub fn new(surface: &'a Surface, cell: f64) -> Self {
-        let far = Vec3::repeat(f64::INFINITY);
-        let (low, high) = surface.vertices.iter().fold((far, -far), |(l, h), v| (l.inf(v), h.sup(v)));
+        let (low, high) = bounds(&surface.vertices);
         let dims = [0, 1, 2].map(|a| if high[a] >= low[a] { ((high[a] - low[a]) / cell) as usize + 1 } else { 1 });
         let ball = |t: usize| {
             let x = surface.corners(t);

@@ -7,7 +7,7 @@
 
 use std::fmt;
 
-use super::topology::{boundary, components, fans, neighbours, pinched_edges, stars};
+use super::topology::{FACES, boundary, components, fans, neighbours, pinched_edges, stars};
 use super::{Field, Nearest, Surface, doubled_area};
 use crate::math::Vec3;
 use crate::mesh::{TetMesh, signed_volume};
@@ -203,7 +203,6 @@ impl MeshReport {
 
 /// Smallest and largest dihedral angle of a tetrahedron, degrees.
 pub fn dihedrals(x: &[Vec3; 4]) -> [f64; 2] {
-    const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
     let normal = FACES.map(|f| doubled_area(f.map(|a| x[a])).normalize());
     let mut out = [180.0f64, 0.0f64];
     for a in 0..4 {

@@ -26,9 +26,7 @@ impl Sampled {
 
     /// A field sampled on a grid made by [`cubic`].
     pub fn of(grid: &Grid, field: &dyn Field) -> Self {
-        let [nx, ny, _] = grid.dims;
-        let place = |at: usize| Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
-        Self::new(grid, (0..grid.len()).map(|at| field.at(&grid.world(&place(at))) as f32).collect())
+        Self::new(grid, (0..grid.len()).map(|at| field.at(&grid.place(at)) as f32).collect())
     }
 
     /// The cell of a place, where in it the place lies, and the samples at its corners (x fastest).

@@ -36,7 +36,12 @@ pub(super) fn join(a: f64, b: f64, k: f64) -> f64 {
     a.min(b) - h * h * k / 4.0
 }
 
+/// Smooth intersection: the larger of two distances, blended over `k`.
+pub(super) fn both(a: f64, b: f64, k: f64) -> f64 {
+    -join(-a, -b, k)
+}
+
 /// Smooth difference: `a` without `b`, blended over `k`.
 pub(super) fn carve(a: f64, b: f64, k: f64) -> f64 {
-    -join(-a, b, k)
+    both(a, -b, k)
 }

@@ -10,7 +10,6 @@
 use super::face::Mouth;
 use super::mesher::Sheet;
 use super::sampled::{Sampled, cubic};
-use super::shapes::join;
 use super::{Field, Grid, Surface, unsigned};
 use crate::math::Vec3;
 
@@ -41,10 +40,11 @@ impl Slit {
         let far = (high - low).norm() as f32;
         let mut level: Vec<f32> =
             to_skull.iter().zip(&to_mandible).map(|(s, m)| 0.5 * (m.min(far) - s.min(far))).collect();
-        let mut rim = vec![0.0; grid.len()];
-        each(&grid, |at, p| {
-            rim[at] = mouth.rim(&p, [to_skull[at], to_mandible[at]].map(f64::from), under.at(&p), BLEND) as f32
-        });
+        let rim_at = |at: usize| {
+            let p = grid.place(at);
+            mouth.rim(&p, [to_skull[at], to_mandible[at]].map(f64::from), under.at(&p), BLEND) as f32
+        };
+        let mut rim: Vec<f32> = (0..grid.len()).map(rim_at).collect();
         for _ in 0..BLURS {
             blur(&grid, &mut level);
             blur(&grid, &mut rim);
@@ -54,17 +54,6 @@ impl Slit {
 
     pub fn sheet(&self) -> Sheet<'_> {
         Sheet { level: &self.level, rim: &self.rim }
-    }
-}
-
-fn each(grid: &Grid, mut visit: impl FnMut(usize, Vec3)) {
-    let [nx, ny, nz] = grid.dims;
-    for k in 0..nz {
-        for j in 0..ny {
-            for i in 0..nx {
-                visit(grid.index([i, j, k]), grid.world(&Vec3::new(i as f64, j as f64, k as f64)));
-            }
-        }
     }
 }
 
@@ -97,9 +86,4 @@ fn sloped(grid: &Grid, values: &[f32]) -> Vec<f32> {
         (0..3).map(|a| along(a).powi(2)).sum::<f64>().sqrt()
     };
     (0..values.len()).map(|at| (f64::from(values[at]) / slope(at).max(FLAT)) as f32).collect()
-}
-
-/// The smooth maximum of two distances.
-pub(super) fn both(a: f64, b: f64, radius: f64) -> f64 {
-    -join(-a, -b, radius)
 }

@@ -1,7 +1,7 @@
 //! How tetrahedra hang together: face neighbours, components, boundary edges.
 
-/// Faces of a tetrahedron, each opposite the corner of the same number, wound outward.
-pub(super) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+pub(super) use crate::mesh::FACES;
+
 /// No neighbour: the face is on the boundary.
 pub(super) const OPEN: u32 = u32::MAX;
 

@@ -45,6 +45,12 @@ impl Grid {
         (k * self.dims[1] + j) * self.dims[0] + i
     }
 
+    /// World position of the sample at a place in memory, m.
+    pub fn place(&self, at: usize) -> Vec3 {
+        let [nx, ny, _] = self.dims;
+        self.world(&Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64))
+    }
+
     /// World position of fractional grid coordinates, m.
     pub fn world(&self, c: &Vec3) -> Vec3 {
         self.origin + self.direction * c.component_mul(&self.spacing)

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use crate::math::Vec3;
+use crate::math::{Vec3, bounds};
 use crate::mesh::{FACES, TetMesh, sorted};
 
 /// Longest edge of the box about a head or a part of it, m; beyond these a unit of length is doubtful.
@@ -25,7 +25,7 @@ pub(super) fn mend(mesh: &mut TetMesh, told: &mut Vec<String>) {
     }
     pieces(mesh, told);
     hanging(mesh, &faces, told);
-    let [low, high] = bounds(mesh);
+    let (low, high) = bounds(&mesh.nodes);
     let size = high - low;
     if !(HEAD[0]..=HEAD[1]).contains(&size.max()) {
         let slip = if size.max() > HEAD[1] { "is it in millimetres?" } else { "was it scaled once too often?" };
@@ -34,11 +34,6 @@ pub(super) fn mend(mesh: &mut TetMesh, told: &mut Vec<String>) {
             size.x, size.y, size.z
         ));
     }
-}
-
-fn bounds(mesh: &TetMesh) -> [Vec3; 2] {
-    let far = Vec3::repeat(f64::INFINITY);
-    mesh.nodes.iter().fold([far, -far], |[low, high], x| [low.inf(x), high.sup(x)])
 }
 
 /// Leaves out nodes that no tetrahedron uses, and faces and set members that need them.

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::IoError;
 use super::text::{Words, exact};
-use crate::math::Vec3;
+use crate::math::{Vec3, bounds};
 use crate::mesh::{FaceSet, NodeSet, TetMesh};
 
 /// Element types: a node, a triangle, a tetrahedron; with their dimension and number of nodes.
@@ -101,11 +101,6 @@ fn put_row(rows: &mut String, tag: usize, nodes: &[u32]) {
     write!(rows, "{tag}").expect("a String takes everything");
     nodes.iter().for_each(|a| write!(rows, " {}", a + 1).expect("a String takes everything"));
     rows.push('\n');
-}
-
-fn bounds(nodes: &[Vec3]) -> (Vec3, Vec3) {
-    let far = Vec3::repeat(f64::INFINITY);
-    nodes.iter().fold((far, -far), |(low, high), x| (low.inf(x), high.sup(x)))
 }
 
 /// An element as read: its number, type, nodes, and the physical groups it belongs to.

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 #![allow(non_snake_case)]
 
+mod bounds;
 pub mod lane;
 mod pose;
 mod psd;
@@ -10,6 +11,7 @@ mod svd;
 mod tensor;
 mod triangle;
 
+pub use bounds::{bounds, extent};
 pub use pose::{Pose, best_fit, exp_rotation, left_jacobian, log_rotation};
 pub use psd::clamp_eigenvalues;
 pub use random::Random;

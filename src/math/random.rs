@@ -8,13 +8,22 @@ use super::Vec3;
 pub struct Random(pub u64);
 
 impl Random {
-    /// Uniform in [0, 1).
-    pub fn number(&mut self) -> f64 {
+    fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn number(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Uniform in [-1, 1].
+    pub fn signed(&mut self) -> f64 {
+        self.bits() as f64 / (1u64 << 63) as f64 - 1.0
     }
 
     /// Uniform in the unit cube.

@@ -5,7 +5,7 @@
 use super::build::Builder;
 use super::file::{BoneSpec, SceneFile};
 use super::programme::numbers;
-use crate::math::Vec3;
+use crate::math::{Vec3, extent};
 use crate::mesh::TetMesh;
 use crate::sim::Marker;
 
@@ -20,8 +20,7 @@ impl Builder<'_> {
     /// What of a scene on its mesh is beyond sense, one sentence each.
     pub(super) fn implausible(&self, file: &SceneFile, mesh: &TetMesh, markers: &[Marker], end: f64) -> Vec<String> {
         let mut told = Vec::new();
-        let (low, high) = mesh.nodes.iter().fold((mesh.nodes[0], mesh.nodes[0]), |(l, h), x| (l.inf(x), h.sup(x)));
-        let size = (high - low).norm();
+        let size = extent(&mesh.nodes);
         let moved = |what: String, values: &[f64], told: &mut Vec<String>| {
             let length = Vec3::from_column_slice(values).norm();
             if length > size {

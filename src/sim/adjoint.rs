@@ -22,7 +22,7 @@ use super::step::complete;
 use super::targets::read_pivots;
 use super::{Sim, SimError};
 use crate::fem::{At, Configuration};
-use crate::math::{Mat3, Pose, Vec3, left_jacobian, log_rotation};
+use crate::math::{Mat3, Pose, Vec3, extent, left_jacobian, log_rotation};
 use crate::port::Slot;
 
 /// Largest motion in a difference of gradients, in sizes of the model.
@@ -122,9 +122,7 @@ impl Sim {
         for term in &parts.terms {
             term.add_gradient(&at, &config.x, &mut g);
         }
-        let X = &model.mesh().nodes;
-        let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
-        let size = (high - low).norm();
+        let size = extent(&model.mesh().nodes);
         let place = Place { model: &model, past, at, config: &config, pivots: &pivots, g: &g, v: &v, size };
 
         let mut weights = Weights::nothing(&place);

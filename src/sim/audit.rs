@@ -4,7 +4,7 @@ use super::model::Model;
 use super::report::StepReport;
 use super::state::{State, are_at_rest};
 use crate::fem::{At, Strain, Term};
-use crate::math::Vec3;
+use crate::math::{Vec3, extent};
 use crate::mesh::signed_volume;
 
 /// A det F at and below which a step tells, and again each time that it has halved.
@@ -163,8 +163,7 @@ pub(super) fn snapped(
     after: &[Vec3],
     elastic: impl Fn(&[Vec3]) -> f64,
 ) -> Option<String> {
-    let (low, high) = before.iter().fold((before[0], before[0]), |(l, h), x| (l.inf(x), h.sup(x)));
-    if !balance.is_suspicious() || distance(before, after) < VISIBLE * (high - low).norm() {
+    if !balance.is_suspicious() || distance(before, after) < VISIBLE * extent(before) {
         return None;
     }
     let (had, has) = (elastic(before), elastic(after));

@@ -24,7 +24,7 @@ use super::ports::Source;
 use super::targets::{place_bones, read_pivots, read_wrenches, target_increments};
 use super::{Model, Sim, SimError, SolveError, State};
 use crate::fem::Configuration;
-use crate::math::{Vec3, left_jacobian, log_rotation};
+use crate::math::{Vec3, extent, left_jacobian, log_rotation};
 use crate::port::{Port, Slot, Type};
 use crate::solve::{Minimiser, Problem, Strategy};
 
@@ -149,9 +149,7 @@ impl Sim {
         }
         let first = FIRST_CHANGE / scale;
         let motion = self.sides(&model, &direction, first, 1)?.motion();
-        let X = &model.mesh().nodes;
-        let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
-        let h = if motion > 0.0 { first * CHANGE * (high - low).norm() / motion } else { first };
+        let h = if motion > 0.0 { first * CHANGE * extent(&model.mesh().nodes) / motion } else { first };
         let Sides(sides) = self.sides(&model, &direction, h, MOST_PASSES)?;
         let past = &self.sensitivity.as_ref().expect("made for the sides").past;
         let ends = Ends { model: &model, past, here: &self.state, sides: &sides, h };

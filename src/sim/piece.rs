@@ -16,7 +16,7 @@ use super::swing::{Swing, none_before};
 use super::targets::{place_bones, target_increments};
 use super::workspace::Workspace;
 use crate::fem::{At, Configuration};
-use crate::math::{Mat3, Vec3, best_fit};
+use crate::math::{Mat3, Vec3, best_fit, extent};
 use crate::solve::{Minimiser, Problem, Rung, Way};
 
 /// A piece that turns elements inside out is cut; where the scene allows them, down to this part of the step only.
@@ -241,8 +241,7 @@ pub(super) fn step_piece(
 /// Refuses loads under which the stiffness at hand would let the tissue go by many of its sizes: no law stiffens that much.
 fn check_reach(before: &[Vec3], predicted: &[Vec3]) -> Result<(), SolveError> {
     let motion = before.iter().zip(predicted).map(|(x, y)| (y - x).norm()).fold(0.0, f64::max);
-    let (low, high) = before.iter().fold((before[0], before[0]), |(l, h), x| (l.inf(x), h.sup(x)));
-    let most = MOST_REACH * (high - low).norm();
+    let most = MOST_REACH * extent(before);
     // What is no number is told by the minimiser.
     if motion > most { Err(SolveError::BeyondReach { motion, most }) } else { Ok(()) }
 }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use super::model::Model;
 use crate::fem::{At, Configuration};
-use crate::math::Vec3;
+use crate::math::{Vec3, extent};
 use crate::solve::{Allowance, LinearSystems, Minimiser, Outcome, Precision, Problem, SolveError, Strategy};
 
 /// The stand-in only has to untangle, so it is solved coarsely: share of the model's size that the last correction may be.
@@ -40,8 +40,7 @@ pub(super) fn untangle(
     let terms = (parts.stand_in)(&parts.mesh, &parts.midsides);
     let wrenches = vec![(Vec3::zeros(), Vec3::zeros()); model.dofs().bodies.len()];
     let problem = Problem { terms: &terms, dofs: model.dofs(), X, pivots, wrenches: &wrenches, at: At::NOWHERE };
-    let (low, high) = X.iter().fold((X[0], X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
-    let strategy = Strategy { tolerance: COARSE * (high - low).norm(), ..STRATEGY };
+    let strategy = Strategy { tolerance: COARSE * extent(X), ..STRATEGY };
     let mut minimiser = Minimiser::new(&problem, strategy)?;
     minimiser.share(allowance);
     let rest = Configuration { x: X.clone(), poses: config.poses.clone() };

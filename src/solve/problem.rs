@@ -1,7 +1,7 @@
 //! What is minimised: the terms plus the work of forces and torques on force-driven bones.
 
 use crate::fem::{At, Configuration, Dofs, Term};
-use crate::math::{Vec3, log_rotation};
+use crate::math::{Vec3, extent, log_rotation};
 
 /// Sizes of the model beyond which a motion is no motion of tissue.
 const FARTHEST: f64 = 1e6;
@@ -40,8 +40,7 @@ impl Problem<'_> {
 
     /// Whether a node has gone so far that stiffnesses there and elsewhere share no digits.
     pub fn is_beyond_numbers(&self, config: &Configuration) -> bool {
-        let (low, high) = self.X.iter().fold((self.X[0], self.X[0]), |(l, h), x| (l.inf(x), h.sup(x)));
-        let far = FARTHEST * (high - low).norm();
+        let far = FARTHEST * extent(self.X);
         config.x.iter().zip(self.X).any(|(x, X)| (x - X).norm() > far)
     }
 

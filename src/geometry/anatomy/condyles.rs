@@ -1,7 +1,7 @@
 //! The heads of a mandible, in the template's frame: what is highest behind and beside, on each side.
 
 use super::super::bones::MANDIBLE;
-use super::super::clean::components;
+use super::super::clean::{components, largest};
 use super::cubes::Cubes;
 use super::split::Split;
 use crate::math::Vec3;
@@ -23,7 +23,7 @@ pub(super) fn condyles(hu: &Cubes, split: &Split) -> [Option<Vec3>; 2] {
         let cubes = || split.cubes.iter().filter(|c| split.map[c.at] == MANDIBLE && in_place(&c.x));
         cubes().for_each(|c| at_side[c.at] = true);
         let (number, sizes) = components(&hu.grid, |at| at_side[at]);
-        let largest = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k))?;
+        let largest = largest(&sizes)?;
         let piece = || cubes().filter(|c| number[c.at] as usize == largest + 1);
         let mut heights: Vec<f64> = piece().map(|c| c.x.z).collect();
         if heights.len() < LEAST {

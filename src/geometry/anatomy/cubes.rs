@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::super::clean::components;
+use super::super::clean::{components, largest};
 use super::super::{Grid, Volume};
 use crate::math::{Mat3, Vec3};
 
@@ -59,8 +59,7 @@ impl Cubes {
 
     /// Position of a sample.
     pub fn place(&self, at: usize) -> Vec3 {
-        let [nx, ny, _] = self.grid.dims;
-        Vec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64) * self.h
+        self.grid.place(at)
     }
 
     /// Far end of the samples.
@@ -108,7 +107,7 @@ impl Cubes {
             tissue = self.stepped(&tissue, false, step);
         }
         let (number, sizes) = components(&self.grid, |at| tissue[at]);
-        let Some(largest) = (0..sizes.len()).max_by_key(|&k| (sizes[k], usize::MAX - k)) else {
+        let Some(largest) = largest(&sizes) else {
             return vec![false; self.values.len()];
         };
         // What was taken off is put back, and as much again: the rim is no place to lose bone.

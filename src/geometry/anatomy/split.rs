@@ -6,7 +6,7 @@ use super::cubes::Cubes;
 use super::flood::watershed;
 use super::seam::Seam;
 use super::template::{Part, Placed, core, crest};
-use crate::math::Vec3;
+use crate::math::{Vec3, bounds};
 
 /// Bone that hangs on nothing: streaks of fillings, calcified cartilage.
 pub(super) const LOOSE: u8 = 5;
@@ -137,8 +137,7 @@ fn cubes(hu: &Cubes, is_bone: &[bool], placed: &Placed, seam: &Seam) -> Vec<Cube
     let template: Vec<(Vec3, Vec3, Part)> =
         core([40, 9, 18, 9]).into_iter().map(|(x, part)| (x, placed.place(&x), part)).collect();
     let crest = crest(100);
-    let far = Vec3::repeat(f64::INFINITY);
-    let (low, high) = template.iter().fold((far, -far), |(l, h), (x, ..)| (l.inf(x), h.sup(x)));
+    let (low, high) = bounds(template.iter().map(|(x, ..)| x));
     // Sizes below 1 bring the template nearer: the box is that much wider.
     let rim = Vec3::repeat(1.5 * REACH);
     let (low, high) = (low - rim, high + rim);

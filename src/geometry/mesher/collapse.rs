@@ -9,10 +9,10 @@
 //! T. Dey, H. Edelsbrunner, S. Guha & D. Nekhayev, "Topology preserving edge contraction", 1999, for the link condition.
 //! Departure: sampled distances to the surface itself instead of quadrics, so errors do not add up.
 
-use super::super::Field;
 use super::super::stencils::Stuffed;
 use super::super::stuffing::{NO_WALL, Wall};
-use super::fit::samples;
+use super::fit::distance;
+use super::linked::{GONE, Linked};
 use super::shape::score;
 use super::sheet::{SHEET, Sheet};
 use crate::math::Vec3;
@@ -29,7 +29,6 @@ const LONG: f64 = 0.9;
 /// Passes over the edges at one tolerance, and the least share of nodes that makes another worth while.
 const PASSES: usize = 12;
 const WORTH: f64 = 0.004;
-const GONE: u32 = u32::MAX;
 
 /// What a coarse mesh must keep.
 pub(in super::super) struct Goal<'a> {
@@ -48,12 +47,8 @@ pub(in super::super) struct Goal<'a> {
 pub(in super::super) type Face = ([u32; 3], u8);
 
 struct Coarsening<'a> {
-    mesh: &'a mut Stuffed,
-    faces: &'a mut Vec<Face>,
-    star: Vec<Vec<u32>>,
-    fan: Vec<Vec<u32>>,
+    on: Linked<'a>,
     longest: Vec<f64>,
-    samples: [[f64; 3]; 10],
     /// Stamps of nodes: what the last look at an edge found about them.
     mark: Vec<u32>,
     stamp: u32,
@@ -64,20 +59,11 @@ struct Coarsening<'a> {
 const SURFACES: [bool; 2] = [false, true];
 
 /// Collapses edges until nothing more fits or the target is reached; faces and mesh are renumbered, nodes keep their order.
-/// Returns for each old node its new number.
-pub(super) fn coarsen(mesh: &mut Stuffed, faces: &mut Vec<Face>, goal: &Goal) -> Vec<u32> {
+pub(super) fn coarsen(mesh: &mut Stuffed, faces: &mut Vec<Face>, goal: &Goal) {
     let n = mesh.nodes.len();
-    let mut star = vec![Vec::new(); n];
-    for (e, t) in mesh.tets.iter().enumerate() {
-        t.iter().for_each(|&a| star[a as usize].push(e as u32));
-    }
-    let mut fan = vec![Vec::new(); n];
-    for (f, (t, _)) in faces.iter().enumerate() {
-        t.iter().for_each(|&a| fan[a as usize].push(f as u32));
-    }
     let longest = mesh.nodes.iter().map(goal.longest).collect();
     let alive = mesh.tets.len();
-    let mut c = Coarsening { mesh, faces, star, fan, longest, samples: samples(), mark: vec![0; n], stamp: 0, alive };
+    let mut c = Coarsening { on: Linked::new(mesh, faces), longest, mark: vec![0; n], stamp: 0, alive };
     // A node is looked at again once something near it changed.
     let mut changed = vec![true; n];
     for _ in 0..PASSES {
@@ -98,11 +84,7 @@ pub(super) fn coarsen(mesh: &mut Stuffed, faces: &mut Vec<Face>, goal: &Goal) ->
             break;
         }
     }
-    c.mesh.tets.retain(|t| t[0] != GONE);
-    c.faces.retain(|t| t.0[0] != GONE);
-    let new = super::super::repair::compact(c.mesh);
-    c.faces.iter_mut().for_each(|(t, _)| *t = t.map(|a| new[a as usize]));
-    new
+    c.on.finish();
 }
 
 impl Coarsening<'_> {
@@ -110,10 +92,10 @@ impl Coarsening<'_> {
     fn edges(&self, changed: &[bool]) -> Vec<[u32; 2]> {
         let mut out: Vec<(f64, [u32; 2])> = Vec::new();
         let mut near = Vec::new();
-        for a in 0..self.star.len() as u32 {
+        for a in 0..self.on.star.len() as u32 {
             self.neighbours(a, &mut near);
             for &b in near.iter().filter(|&&b| b > a && (changed[a as usize] || changed[b as usize])) {
-                let length = (self.mesh.nodes[a as usize] - self.mesh.nodes[b as usize]).norm();
+                let length = (self.on.mesh.nodes[a as usize] - self.on.mesh.nodes[b as usize]).norm();
                 let share = length / self.longest[a as usize].min(self.longest[b as usize]);
                 if share < LONG {
                     out.push((share, [a, b]));
@@ -126,8 +108,8 @@ impl Coarsening<'_> {
 
     fn neighbours(&self, a: u32, out: &mut Vec<u32>) {
         out.clear();
-        for &e in &self.star[a as usize] {
-            out.extend(self.mesh.tets[e as usize].iter().filter(|&&b| b != a));
+        for &e in &self.on.star[a as usize] {
+            out.extend(self.on.mesh.tets[e as usize].iter().filter(|&&b| b != a));
         }
         out.sort_unstable();
         out.dedup();
@@ -135,14 +117,14 @@ impl Coarsening<'_> {
 
     fn allows(&mut self, u: u32, v: u32, goal: &Goal) -> bool {
         let (i, j) = (u as usize, v as usize);
-        let mesh = &*self.mesh;
-        if self.star[i].is_empty() || self.star[j].is_empty() {
+        let mesh = &*self.on.mesh;
+        if self.on.star[i].is_empty() || self.on.star[j].is_empty() {
             return false;
         }
-        let on_surface = !self.fan[i].is_empty();
+        let on_surface = !self.on.fan[i].is_empty();
         let fits = mesh.wall[i] == NO_WALL || mesh.wall[i] == mesh.wall[j];
         let nameless = on_surface && mesh.wall[i] == NO_WALL && mesh.plane[i] == 0;
-        if nameless || !fits || mesh.plane[i] & !mesh.plane[j] != 0 || on_surface && self.fan[j].is_empty() {
+        if nameless || !fits || mesh.plane[i] & !mesh.plane[j] != 0 || on_surface && self.on.fan[j].is_empty() {
             return false;
         }
         self.links_meet(u, v) && self.stays_good(u, v) && (!on_surface || self.stays_near(u, v, goal))
@@ -150,14 +132,14 @@ impl Coarsening<'_> {
 
     /// Whether the links of both ends meet in the link of the edge, in the mesh and on its surface.
     fn links_meet(&mut self, u: u32, v: u32) -> bool {
-        let tets = &self.mesh.tets;
+        let tets = &self.on.mesh.tets;
         if self.stamp > u32::MAX - 3 {
             self.mark.fill(0);
             self.stamp = 0;
         }
         let [of_u, common, closed] = [1, 2, 3].map(|k| self.stamp + k);
         self.stamp += 3;
-        let (star_u, star_v) = (&self.star[u as usize], &self.star[v as usize]);
+        let (star_u, star_v) = (&self.on.star[u as usize], &self.on.star[v as usize]);
         for a in star_u.iter().flat_map(|&e| tets[e as usize]) {
             self.mark[a as usize] = of_u;
         }
@@ -183,7 +165,7 @@ impl Coarsening<'_> {
         let mark = &self.mark;
         let pairs = |a: u32, other: u32, with: bool| {
             let mut out: Vec<[u32; 2]> = Vec::new();
-            let star = self.star[a as usize].iter().map(|&e| tets[e as usize]);
+            let star = self.on.star[a as usize].iter().map(|&e| tets[e as usize]);
             for t in star.filter(|t| t.contains(&other) == with) {
                 let mut ring = [0; 4];
                 let mut n = 0;
@@ -210,9 +192,9 @@ impl Coarsening<'_> {
     /// The same on the boundary or on the sheet, if `u` lies on it.
     fn surfaces_meet(&self, u: u32, v: u32, sheet: bool) -> bool {
         let of = |a: u32| {
-            self.fan[a as usize]
+            self.on.fan[a as usize]
                 .iter()
-                .map(|&f| self.faces[f as usize])
+                .map(|&f| self.on.faces[f as usize])
                 .filter(move |f| (f.1 == SHEET) == sheet)
                 .map(|f| f.0)
         };
@@ -235,10 +217,10 @@ impl Coarsening<'_> {
     }
 
     fn stays_good(&self, u: u32, v: u32) -> bool {
-        let mesh = &*self.mesh;
+        let mesh = &*self.on.mesh;
         let place = mesh.nodes[v as usize];
         let moved = |t: [u32; 4]| t.map(|a| if a == u { place } else { mesh.nodes[a as usize] });
-        let rest = || self.star[u as usize].iter().map(|&e| mesh.tets[e as usize]).filter(|t| !t.contains(&v));
+        let rest = || self.on.star[u as usize].iter().map(|&e| mesh.tets[e as usize]).filter(|t| !t.contains(&v));
         for t in rest() {
             for a in t.into_iter().filter(|&a| a != u) {
                 let most = self.longest[a as usize].min(self.longest[v as usize]);
@@ -252,7 +234,7 @@ impl Coarsening<'_> {
         }
         // What is there now is looked at only once something is not good.
         let old = || {
-            let all = self.star[u as usize].iter();
+            let all = self.on.star[u as usize].iter();
             all.map(|&e| score(&mesh.tets[e as usize].map(|a| mesh.nodes[a as usize]))).fold(f64::INFINITY, f64::min)
         };
         let mut least: Option<f64> = None;
@@ -263,10 +245,10 @@ impl Coarsening<'_> {
     }
 
     fn stays_near(&self, u: u32, v: u32, goal: &Goal) -> bool {
-        let mesh = &*self.mesh;
+        let mesh = &*self.on.mesh;
         let normal = |x: &[Vec3; 3]| (x[1] - x[0]).cross(&(x[2] - x[0]));
-        for &f in &self.fan[u as usize] {
-            let (t, wall) = self.faces[f as usize];
+        for &f in &self.on.fan[u as usize] {
+            let (t, wall) = self.on.faces[f as usize];
             if t.contains(&v) {
                 continue;
             }
@@ -284,50 +266,39 @@ impl Coarsening<'_> {
                 (Some(sheet), SHEET) => sheet.level,
                 _ => goal.walls[usize::from(wall)].field,
             };
-            let [mean, most] = self.distance(field, &new);
-            if (mean > tolerance || most > LARGEST * tolerance) && mean > self.distance(field, &old)[0] {
+            let [mean, most] = distance(field, &new);
+            if (mean > tolerance || most > LARGEST * tolerance) && mean > distance(field, &old)[0] {
                 return false;
             }
         }
         true
     }
 
-    /// Mean and largest distance of a triangle's samples from the zero of a field, m.
-    fn distance(&self, field: &dyn Field, x: &[Vec3; 3]) -> [f64; 2] {
-        let (mut sum, mut most) = (0.0, 0.0f64);
-        for b in &self.samples {
-            let d = field.at(&(x[0] * b[0] + x[1] * b[1] + x[2] * b[2])).abs();
-            sum += d;
-            most = most.max(d);
-        }
-        [sum / self.samples.len() as f64, most]
-    }
-
     fn collapse(&mut self, u: u32, v: u32, changed: &mut [bool]) {
-        for e in std::mem::take(&mut self.star[u as usize]) {
-            let t = self.mesh.tets[e as usize];
+        for e in std::mem::take(&mut self.on.star[u as usize]) {
+            let t = self.on.mesh.tets[e as usize];
             t.iter().for_each(|&a| changed[a as usize] = true);
             if t.contains(&v) {
                 for a in t.into_iter().filter(|&a| a != u) {
-                    self.star[a as usize].retain(|&other| other != e);
+                    self.on.star[a as usize].retain(|&other| other != e);
                 }
-                self.mesh.tets[e as usize] = [GONE; 4];
+                self.on.mesh.tets[e as usize] = [GONE; 4];
                 self.alive -= 1;
             } else {
-                self.mesh.tets[e as usize] = t.map(|a| if a == u { v } else { a });
-                self.star[v as usize].push(e);
+                self.on.mesh.tets[e as usize] = t.map(|a| if a == u { v } else { a });
+                self.on.star[v as usize].push(e);
             }
         }
-        for f in std::mem::take(&mut self.fan[u as usize]) {
-            let t = self.faces[f as usize].0;
+        for f in std::mem::take(&mut self.on.fan[u as usize]) {
+            let t = self.on.faces[f as usize].0;
             if t.contains(&v) {
                 for a in t.into_iter().filter(|&a| a != u) {
-                    self.fan[a as usize].retain(|&other| other != f);
+                    self.on.fan[a as usize].retain(|&other| other != f);
                 }
-                self.faces[f as usize].0 = [GONE; 3];
+                self.on.faces[f as usize].0 = [GONE; 3];
             } else {
-                self.faces[f as usize].0 = t.map(|a| if a == u { v } else { a });
-                self.fan[v as usize].push(f);
+                self.on.faces[f as usize].0 = t.map(|a| if a == u { v } else { a });
+                self.on.fan[v as usize].push(f);
             }
         }
     }

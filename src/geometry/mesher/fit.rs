@@ -6,11 +6,14 @@
 //! Nodes on a curved wall put every chord inside it; after the fit surface and volume err to both sides. Samples further off
 //! than .15 of a triangle's size are left out: they see another sheet of the wall.
 
+use super::super::Field;
 use super::super::stencils::Stuffed;
+use super::collapse::Face;
 use super::shape::Star;
 use super::sheet::{ON_SHEET, SHEET};
 use super::smooth::Stars;
 use super::walls::{Held, in_planes};
+use crate::math::Vec3;
 
 const STEP: f64 = 0.4;
 const OTHER: f64 = 0.15;
@@ -20,22 +23,34 @@ const STEEP: f64 = 0.3;
 const GOOD: f64 = 0.35;
 
 /// Ten points of a triangle, as weights of its corners: the middles of its sixteen quarters' upright ones.
-pub(super) fn samples() -> [[f64; 3]; 10] {
+const SAMPLES: [[f64; 3]; 10] = {
     let mut out = [[0.0; 3]; 10];
-    let mut k = 0;
-    for i in 0..4 {
-        for j in 0..4 - i {
-            let (u, v) = ((f64::from(i) + 1.0 / 3.0) / 4.0, (f64::from(j) + 1.0 / 3.0) / 4.0);
+    let (mut i, mut k) = (0, 0);
+    while i < 4 {
+        let mut j = 0;
+        while j < 4 - i {
+            let (u, v) = ((i as f64 + 1.0 / 3.0) / 4.0, (j as f64 + 1.0 / 3.0) / 4.0);
             out[k] = [u, v, 1.0 - u - v];
-            k += 1;
+            (j, k) = (j + 1, k + 1);
         }
+        i += 1;
     }
     out
+};
+
+/// Mean and largest distance of a triangle's samples from the zero of a field, m.
+pub(super) fn distance(field: &dyn Field, x: &[Vec3; 3]) -> [f64; 2] {
+    let (mut sum, mut most) = (0.0, 0.0f64);
+    for b in &SAMPLES {
+        let d = field.at(&(x[0] * b[0] + x[1] * b[1] + x[2] * b[2])).abs();
+        sum += d;
+        most = most.max(d);
+    }
+    [sum / SAMPLES.len() as f64, most]
 }
 
 /// Rounds of the fit over triangles that know their wall; the offsets that result are kept from then on.
-pub(super) fn fit(mesh: &mut Stuffed, triangles: &[([u32; 3], u8)], stars: &Stars, held: &mut Held, rounds: usize) {
-    let samples = samples();
+pub(super) fn fit(mesh: &mut Stuffed, triangles: &[Face], stars: &Stars, held: &mut Held, rounds: usize) {
     let mut star = Star::default();
     for _ in 0..rounds {
         let mut sums = vec![[0.0; 2]; mesh.nodes.len()];
@@ -44,7 +59,7 @@ pub(super) fn fit(mesh: &mut Stuffed, triangles: &[([u32; 3], u8)], stars: &Star
             let x = t.map(|a| mesh.nodes[a as usize]);
             let area = (x[1] - x[0]).cross(&(x[2] - x[0])).norm();
             let far = OTHER * area.sqrt();
-            for b in &samples {
+            for b in &SAMPLES {
                 let d = wall.depth(&(x[0] * b[0] + x[1] * b[1] + x[2] * b[2]));
                 if d.abs() > far {
                     continue;

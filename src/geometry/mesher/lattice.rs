@@ -16,8 +16,8 @@ use super::super::stencils::Stuffed;
 use super::super::stuffing::NO_WALL;
 use super::super::{Cuboid, MeshingError};
 use super::octree::{Bits, Cell, Octree};
+use super::stuff::orient;
 use crate::math::Vec3;
-use crate::mesh::signed_volume;
 
 /// Largest number of finest cells that are laid out.
 const CELL_LIMIT: u64 = 2_000_000_000;
@@ -210,11 +210,7 @@ pub(super) fn lattice(plan: &Plan, tree: &Octree) -> Stuffed {
         })
         .collect();
     let number = |key: u64| keys.binary_search(&key).expect("every key is listed") as u32;
-    let oriented = |t: &[u64; 4]| {
-        let t = t.map(number);
-        let positive = signed_volume(t.map(|a| nodes[a as usize])) > 0.0;
-        if positive { t } else { [t[0], t[1], t[3], t[2]] }
-    };
-    let tets = b.tets.iter().map(oriented).collect();
+    let mut tets: Vec<[u32; 4]> = b.tets.iter().map(|t| t.map(number)).collect();
+    orient(&nodes, &mut tets);
     Stuffed { wall: vec![NO_WALL; nodes.len()], nodes, plane, tets }
 }

@@ -11,6 +11,7 @@ mod collapse;
 mod cut;
 mod fit;
 mod lattice;
+mod linked;
 mod octree;
 mod refine;
 mod shape;

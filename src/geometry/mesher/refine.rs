@@ -21,8 +21,8 @@ const FILM: f64 = 0.45e-3;
 
 /// What the lattice must resolve.
 pub(in super::super) struct Detail<'a> {
-    /// Mean residual allowed by wall, m; walls beyond the list are not refined for.
-    pub tolerance: &'a [f64],
+    /// Mean residual allowed for the first two walls, m; others are not refined for.
+    pub tolerance: [f64; 2],
     /// Longest cell at a wall, m.
     pub cap: f64,
     /// Factor on tolerance and cap at a place.
@@ -41,14 +41,13 @@ impl Detail<'_> {
         if h < 1.9 * self.floor.min(thin) {
             return false;
         }
-        let n = self.tolerance.len();
         let depth: Vec<f64> = walls.iter().map(|w| w.depth(centre)).collect();
         let reach = 0.5 * edge.norm();
         // Nothing of the tissue in it.
         if depth.iter().any(|&d| d > reach) {
             return false;
         }
-        if depth[..n].iter().all(|d| d.abs() > reach + 0.5 * h) {
+        if depth[..2].iter().all(|d| d.abs() > reach + 0.5 * h) {
             return false;
         }
         let scale = (self.scale)(centre);
@@ -58,19 +57,19 @@ impl Detail<'_> {
         for (s, o) in offsets.iter_mut().enumerate() {
             *o = Vec3::new(at(s % SAMPLES), at(s / SAMPLES % SAMPLES), at(s / (SAMPLES * SAMPLES)));
         }
-        for w in 0..n.min(2) {
-            for (o, d) in offsets.iter().zip(&mut samples[w]) {
-                *d = walls[w].depth(&(centre + o.component_mul(edge)));
+        for (wall, samples) in walls.iter().zip(&mut samples) {
+            for (o, d) in offsets.iter().zip(samples) {
+                *d = wall.depth(&(centre + o.component_mul(edge)));
             }
         }
         let squares: f64 = offsets.iter().map(|o| o.x * o.x).sum();
-        for w in 0..n.min(2) {
+        for w in 0..2 {
             let (own, other) = (&samples[w], &samples[1 - w]);
             let mean = own.iter().sum::<f64>() / own.len() as f64;
             let slope = offsets.iter().zip(own).map(|(o, d)| o * *d).sum::<Vec3>() / squares;
             let (mut sum, mut weight) = (0.0, 0.0);
             for ((o, d), e) in offsets.iter().zip(own).zip(other) {
-                if n > 1 && *e > BEYOND * h {
+                if *e > BEYOND * h {
                     continue;
                 }
                 let near = (1.0 - d.abs() / (0.5 * h)).max(0.0);
@@ -88,8 +87,7 @@ impl Detail<'_> {
     /// Whether the tissue behind the first wall ends within a cell's edge, but not as a film.
     fn is_thin(&self, walls: &[Wall], offsets: &[Vec3], samples: &[f64], centre: &Vec3, edge: &Vec3) -> bool {
         let h = edge.sum() / 3.0;
-        let level =
-            |p: &Vec3| walls[..self.tolerance.len()].iter().map(|w| w.depth(p)).fold(f64::NEG_INFINITY, f64::max);
+        let level = |p: &Vec3| walls[..2].iter().map(|w| w.depth(p)).fold(f64::NEG_INFINITY, f64::max);
         offsets.iter().zip(samples).step_by(2).filter(|(_, d)| d.abs() < NEAR * h).any(|(o, _)| {
             let p = centre + o.component_mul(edge);
             let (d, slope) = walls[0].slope(&p);

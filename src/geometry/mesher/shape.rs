@@ -32,16 +32,16 @@ fn inverse_power(q: f64, p: i32) -> f64 {
     if p > 3 { r * r } else { r }
 }
 
+/// Sum of the squares of the edges' lengths.
+fn squares(edges: [Vec3; 6]) -> f64 {
+    edges.iter().map(Vec3::norm_squared).sum()
+}
+
 /// Mean ratio of a tetrahedron; not positive where it is flat or inside out.
 pub(super) fn mean_ratio(x: &[Vec3; 4]) -> f64 {
     let (a, b, c) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
     let v = a.cross(&b).dot(&c);
-    let l = a.norm_squared()
-        + b.norm_squared()
-        + c.norm_squared()
-        + (a - b).norm_squared()
-        + (b - c).norm_squared()
-        + (c - a).norm_squared();
+    let l = squares([a, b, c, a - b, b - c, c - a]);
     if v <= 0.0 { v / (l * l.sqrt()) } else { 12.0 * cube_root(0.25 * v * v) / l }
 }
 
@@ -66,8 +66,13 @@ pub(super) fn score(x: &[Vec3; 4]) -> f64 {
     if q <= FLAT {
         return q;
     }
+    graded(q, x)
+}
+
+/// Score of a tetrahedron that is not flat, by its mean ratio and its angles.
+fn graded(mean_ratio: f64, x: &[Vec3; 4]) -> f64 {
     let [small, large] = cosines(x);
-    q.min(6.0 * (1.0 - small)).min(3.5 * (1.0 + large))
+    mean_ratio.min(6.0 * (1.0 - small)).min(3.5 * (1.0 + large))
 }
 
 /// The tetrahedra round a node: of each the other three corners, wound so that the node's place makes it positive.
@@ -124,8 +129,7 @@ impl Star {
                 return (f64::INFINITY, q);
             }
             energy += inverse_power(q, p);
-            let [small, large] = cosines(&t);
-            worst = worst.min(q).min(6.0 * (1.0 - small)).min(3.5 * (1.0 + large));
+            worst = worst.min(graded(q, &t));
         }
         (energy, worst)
     }
@@ -143,12 +147,7 @@ impl Star {
             let (u, v, w) = (a - x, b - x, c - x);
             let dv = -((b - a).cross(&(c - a)));
             let volume = u.cross(&v).dot(&w);
-            let l = u.norm_squared()
-                + v.norm_squared()
-                + w.norm_squared()
-                + (a - b).norm_squared()
-                + (b - c).norm_squared()
-                + (c - a).norm_squared();
+            let l = squares([u, v, w, a - b, b - c, c - a]);
             let dl = -2.0 * (u + v + w);
             let cube = 432.0 * volume * volume / (l * l * l);
             let e = if p > 3 { 1.0 / (cube * cube) } else { 1.0 / cube };

@@ -43,20 +43,8 @@ pub(in super::super) struct Sheet<'a> {
 /// Puts a sheet into a mesh: its nodes are marked, its faces returned, each once. `faces` follow the splits.
 pub(super) fn insert(mesh: &mut Stuffed, faces: &mut Vec<Face>, walls: &[Wall], sheet: &Sheet) -> Vec<[u32; 3]> {
     let active = active(mesh, sheet);
-    let mut sign: Vec<i8> = mesh
-        .nodes
-        .iter()
-        .zip(&active)
-        .map(|(x, &on)| {
-            if !on {
-                1
-            } else if sheet.level.at(x) < 0.0 {
-                -1
-            } else {
-                1
-            }
-        })
-        .collect();
+    let mut sign: Vec<i8> =
+        mesh.nodes.iter().zip(&active).map(|(x, &on)| if on && sheet.level.at(x) < 0.0 { -1 } else { 1 }).collect();
     draw(mesh, walls, sheet, &active, &mut sign);
     split(mesh, faces, sheet, &active, &mut sign);
     let mut found = between(mesh, sheet, &sign);
@@ -89,19 +77,22 @@ fn draw(mesh: &mut Stuffed, walls: &[Wall], sheet: &Sheet, active: &[bool], sign
         if sheet.level.at(&x).abs() > REACH * star.shortest {
             continue;
         }
-        let bounds = mesh.plane[a];
-        mesh.plane[a] |= ON_SHEET;
-        let goes = held.returned(mesh, a, x).filter(|y| {
-            (y - x).norm() < 1.5 * REACH * star.shortest && star.worst(y) > LEAST.min(0.5 * star.worst(&x))
-        });
-        match goes {
-            Some(y) => {
-                mesh.nodes[a] = y;
-                sign[a] = 0;
-            }
-            None => mesh.plane[a] = bounds,
+        if bind(mesh, &held, &star, a, ON_SHEET, 1.5 * REACH * star.shortest) {
+            sign[a] = 0;
         }
     }
+}
+
+/// Binds a node to the sheet or its rim and moves it there, if it is nearer than `most` and its star allows.
+fn bind(mesh: &mut Stuffed, held: &Held, star: &Star, a: usize, bit: u8, most: f64) -> bool {
+    let (x, bounds) = (mesh.nodes[a], mesh.plane[a]);
+    mesh.plane[a] |= bit;
+    let allowed = |y: &Vec3| (y - x).norm() < most && star.worst(y) > LEAST.min(0.5 * star.worst(&x));
+    match held.returned(mesh, a, x).filter(allowed) {
+        Some(y) => mesh.nodes[a] = y,
+        None => mesh.plane[a] = bounds,
+    }
+    mesh.plane[a] & bit != 0
 }
 
 /// Splits every edge between nodes on both sides, the longest first.
@@ -151,16 +142,7 @@ pub(in super::super) fn split_edges(mesh: &mut Stuffed, faces: &mut Vec<Face>, e
             faces[f as usize].0 = t.map(|n| if n == b { new } else { n });
             let other = faces.len() as u32;
             faces.push((t.map(|n| if n == a { new } else { n }), wall));
-            for n in t {
-                if let Some(s) = fan.get_mut(&n) {
-                    if n == b {
-                        s.retain(|&g| g != f);
-                    }
-                    if n != a {
-                        s.push(other);
-                    }
-                }
-            }
+            relink(&mut fan, t, [a, b], [f, other]);
         }
         let (p, q) = (a as usize, b as usize);
         let same = on_surface && mesh.wall[p] == mesh.wall[q];
@@ -172,15 +154,25 @@ pub(in super::super) fn split_edges(mesh: &mut Stuffed, faces: &mut Vec<Face>, e
             mesh.tets[e as usize] = t.map(|n| if n == b { new } else { n });
             let other = mesh.tets.len() as u32;
             mesh.tets.push(t.map(|n| if n == a { new } else { n }));
-            for n in t {
-                if let Some(s) = star.get_mut(&n) {
-                    if n == b {
-                        s.retain(|&g| g != e);
-                    }
-                    if n != a {
-                        s.push(other);
-                    }
-                }
+            relink(&mut star, t, [a, b], [e, other]);
+        }
+    }
+}
+
+/// Brings lists up to date after an edge a-b of an item was split: the item keeps a, another has b and all the rest, too.
+fn relink<const N: usize>(
+    lists: &mut HashMap<u32, Vec<u32>>,
+    nodes: [u32; N],
+    [a, b]: [u32; 2],
+    [own, other]: [u32; 2],
+) {
+    for n in nodes {
+        if let Some(list) = lists.get_mut(&n) {
+            if n == b {
+                list.retain(|&k| k != own);
+            }
+            if n != a {
+                list.push(other);
             }
         }
     }
@@ -234,17 +226,9 @@ fn trim(mesh: &mut Stuffed, walls: &[Wall], sheet: &Sheet, faces: &mut Vec<[u32;
         }
         for a in [near as usize, far as usize] {
             star.read(&mesh.nodes, &mesh.tets, stars.star(a), a as u32);
-            let bounds = mesh.plane[a];
-            mesh.plane[a] |= ON_RIM;
-            let x = mesh.nodes[a];
-            let goes = held
-                .returned(mesh, a, x)
-                .filter(|y| (y - x).norm() < star.mean && star.worst(y) > LEAST.min(0.5 * star.worst(&x)));
-            if let Some(y) = goes {
-                mesh.nodes[a] = y;
+            if bind(mesh, &held, &star, a, ON_RIM, star.mean) {
                 break;
             }
-            mesh.plane[a] = bounds;
         }
     }
     let inside = |a: u32| mesh.plane[a as usize] & ON_RIM != 0 || sheet.rim.at(&mesh.nodes[a as usize]) < 0.0;

@@ -7,7 +7,7 @@ use super::super::stencils::Stuffed;
 use super::super::topology::stars;
 use super::shape::Star;
 use super::walls::Held;
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Random, Vec3};
 
 /// Shorter steps that are tried, each .4 of the one before.
 const TRIES: usize = 4;
@@ -35,22 +35,27 @@ impl Stars {
     }
 }
 
-/// One round over the nodes whose star's worst score is below `limit`, with the power `p` of the energy.
-pub(super) fn round(mesh: &mut Stuffed, stars: &Stars, held: &Held, p: i32, limit: f64) {
+/// Moves each node, in order, to the place that `place` finds for it in its star, if any.
+fn visit(mesh: &mut Stuffed, stars: &Stars, place: impl Fn(&Stuffed, &Star, usize) -> Option<Vec3>) {
     let mut star = Star::default();
     for a in 0..mesh.nodes.len() {
         if stars.star(a).is_empty() {
             continue;
         }
         star.read(&mesh.nodes, &mesh.tets, stars.star(a), a as u32);
-        if let Some(x) = better(mesh, &star, held, a, p, limit) {
+        if let Some(x) = place(mesh, &star, a) {
             mesh.nodes[a] = x;
         }
     }
 }
 
+/// One round over the nodes whose star's worst score is below `limit`, with the power `p` of the energy.
+pub(super) fn round(mesh: &mut Stuffed, stars: &Stars, held: &Held, p: i32, limit: f64) {
+    visit(mesh, stars, |mesh, star, a| better(mesh, star, held, a, p, limit));
+}
+
 /// A better place for a node, if a Newton step in its freedom leads to one.
-pub(super) fn better(mesh: &Stuffed, star: &Star, held: &Held, a: usize, p: i32, limit: f64) -> Option<Vec3> {
+fn better(mesh: &Stuffed, star: &Star, held: &Held, a: usize, p: i32, limit: f64) -> Option<Vec3> {
     let x = mesh.nodes[a];
     let (energy, worst) = star.energy(&x, p);
     if worst > limit || !energy.is_finite() {
@@ -102,22 +107,13 @@ fn newton(gradient: &Vec3, hessian: &Mat3, basis: &[Vec3]) -> Vec3 {
 
 /// Searches round the nodes of the worst stars, those below `limit`, for places where the worst score rises.
 pub(super) fn rescue(mesh: &mut Stuffed, stars: &Stars, held: &Held, limit: f64, rounds: usize) {
-    let mut star = Star::default();
     for r in 0..rounds {
-        for a in 0..mesh.nodes.len() {
-            if stars.star(a).is_empty() {
-                continue;
-            }
-            star.read(&mesh.nodes, &mesh.tets, stars.star(a), a as u32);
-            if let Some(x) = rescued(mesh, &star, held, a, limit, r) {
-                mesh.nodes[a] = x;
-            }
-        }
+        visit(mesh, stars, |mesh, star, a| rescued(mesh, star, held, a, limit, r));
     }
 }
 
 /// The best of some places round a node, if its star is worse than `limit` and one of them is better.
-pub(super) fn rescued(mesh: &Stuffed, star: &Star, held: &Held, a: usize, limit: f64, seed: usize) -> Option<Vec3> {
+fn rescued(mesh: &Stuffed, star: &Star, held: &Held, a: usize, limit: f64, seed: usize) -> Option<Vec3> {
     let mut x = mesh.nodes[a];
     let mut worst = star.worst(&x);
     if worst > limit {
@@ -131,7 +127,7 @@ pub(super) fn rescued(mesh: &Stuffed, star: &Star, held: &Held, a: usize, limit:
     let mut found = None;
     for k in 0..POINTS {
         let reach = SPREAD * star.mean * 0.5f64.powi((k % 5) as i32);
-        let step: Vec3 = basis[..n].iter().map(|u| u * (reach * random.next())).sum();
+        let step: Vec3 = basis[..n].iter().map(|u| u * (reach * random.signed())).sum();
         let Some(y) = held.returned(mesh, a, x + step) else { continue };
         let w = star.worst(&y);
         if w > worst * 1.001 && w > 0.0 {
@@ -140,17 +136,4 @@ pub(super) fn rescued(mesh: &Stuffed, star: &Star, held: &Held, a: usize, limit:
         }
     }
     found
-}
-
-/// Numbers in -1 .. 1 from a seed (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ z >> 31) as f64 / (1u64 << 63) as f64 - 1.0
-    }
 }

@@ -47,16 +47,11 @@ pub(super) fn stuff(mut mesh: Stuffed, walls: &[Wall]) -> Stuffed {
     mesh.plane.extend(plane);
     mesh.nodes.extend(&cuts.points);
     mesh.wall = (0..mesh.nodes.len())
-        .map(|a| if a < sign.len() && sign[a] != 0 { NO_WALL } else { nearest_wall(walls, &mesh.nodes[a]) })
+        .map(|a| if a < sign.len() && sign[a] != 0 { NO_WALL } else { depth(walls, &mesh.nodes[a]).1 })
         .collect();
     orient(&mesh.nodes, &mut tets);
     mesh.tets = tets;
     mesh
-}
-
-/// The wall that a point on one of them lies on.
-pub(super) fn nearest_wall(walls: &[Wall], p: &Vec3) -> u8 {
-    depth(walls, p).1
 }
 
 /// Turns tetrahedra so that their volumes are positive.

@@ -8,12 +8,12 @@
 //! Engng 40, 1997; J. Shewchuk, "Two discrete optimization algorithms for the topological improvement of tetrahedral
 //! meshes", 2002, for the triangulation of the ring.
 
-use super::super::Field;
 use super::super::stencils::Stuffed;
 use super::super::stuffing::{NO_WALL, Wall};
 use super::super::topology::FACES;
 use super::collapse::Face;
-use super::fit::samples;
+use super::fit::distance;
+use super::linked::{GONE, Linked};
 use super::shape::{Star, score};
 use super::sheet::SHEET;
 use crate::math::Vec3;
@@ -24,40 +24,27 @@ const RING: usize = 7;
 const BETTER: f64 = 1.02;
 /// Steps of a new node to its best place.
 const INSERT_STEPS: usize = 8;
-const GONE: u32 = u32::MAX;
 const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 struct Swapping<'a> {
-    mesh: &'a mut Stuffed,
-    faces: &'a mut Vec<Face>,
+    on: Linked<'a>,
     walls: &'a [Wall<'a>],
-    star: Vec<Vec<u32>>,
-    fan: Vec<Vec<u32>>,
-    samples: [[f64; 3]; 10],
 }
 
 /// Swaps round tetrahedra whose score is below `limit`, at most `rounds` times over; returns how many swaps were made.
 pub(super) fn swap(mesh: &mut Stuffed, faces: &mut Vec<Face>, walls: &[Wall], limit: f64, rounds: usize) -> usize {
-    let n = mesh.nodes.len();
-    let (mut star, mut fan) = (vec![Vec::new(); n], vec![Vec::new(); n]);
-    for (e, t) in mesh.tets.iter().enumerate() {
-        t.iter().for_each(|&a| star[a as usize].push(e as u32));
-    }
-    for (f, (t, _)) in faces.iter().enumerate() {
-        t.iter().for_each(|&a| fan[a as usize].push(f as u32));
-    }
-    let mut s = Swapping { mesh, faces, walls, star, fan, samples: samples() };
+    let mut s = Swapping { on: Linked::new(mesh, faces), walls };
     let mut all = 0;
     for _ in 0..rounds {
-        let mut bad: Vec<(f64, u32)> = (0..s.mesh.tets.len() as u32)
-            .filter(|&e| s.mesh.tets[e as usize][0] != GONE)
+        let mut bad: Vec<(f64, u32)> = (0..s.on.mesh.tets.len() as u32)
+            .filter(|&e| s.on.mesh.tets[e as usize][0] != GONE)
             .map(|e| (s.score_of(e), e))
             .filter(|b| b.0 < limit)
             .collect();
         bad.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)));
         let mut made = 0;
         for (_, e) in bad {
-            if s.mesh.tets[e as usize][0] != GONE && (s.edges(e) || s.sides(e) || s.peel(e) || s.insert(e)) {
+            if s.on.mesh.tets[e as usize][0] != GONE && (s.edges(e) || s.sides(e) || s.peel(e) || s.insert(e)) {
                 made += 1;
             }
         }
@@ -66,59 +53,62 @@ pub(super) fn swap(mesh: &mut Stuffed, faces: &mut Vec<Face>, walls: &[Wall], li
             break;
         }
     }
-    s.mesh.tets.retain(|t| t[0] != GONE);
-    s.faces.retain(|t| t.0[0] != GONE);
-    let new = super::super::repair::compact(s.mesh);
-    s.faces.iter_mut().for_each(|(t, _)| *t = t.map(|a| new[a as usize]));
+    s.on.finish();
     all
 }
 
 impl Swapping<'_> {
     fn at(&self, t: [u32; 4]) -> [Vec3; 4] {
-        t.map(|a| self.mesh.nodes[a as usize])
+        t.map(|a| self.on.mesh.nodes[a as usize])
     }
 
     fn score_of(&self, e: u32) -> f64 {
-        score(&self.at(self.mesh.tets[e as usize]))
+        score(&self.at(self.on.mesh.tets[e as usize]))
     }
 
     fn face(&self, a: u32, b: u32, c: u32) -> Option<u32> {
-        self.fan[a as usize].iter().copied().find(|&f| {
-            let t = self.faces[f as usize].0;
+        self.on.fan[a as usize].iter().copied().find(|&f| {
+            let t = self.on.faces[f as usize].0;
             t.contains(&b) && t.contains(&c)
         })
     }
 
     fn on_surface(&self, a: u32, b: u32) -> bool {
-        self.fan[a as usize].iter().any(|&f| self.faces[f as usize].0.contains(&b))
+        self.on.fan[a as usize].iter().any(|&f| self.on.faces[f as usize].0.contains(&b))
+    }
+
+    /// The tetrahedra round an edge inside the mesh.
+    fn round(&self, a: u32, b: u32) -> Option<Vec<u32>> {
+        let star = self.on.star[a as usize].iter().copied();
+        (!self.on_surface(a, b)).then(|| star.filter(|&e| self.on.mesh.tets[e as usize].contains(&b)).collect())
+    }
+
+    fn worst(&self, tets: &[u32]) -> f64 {
+        tets.iter().map(|&e| self.score_of(e)).fold(f64::INFINITY, f64::min)
     }
 
     fn replace(&mut self, old: &[u32], new: &[[u32; 4]]) {
         for &e in old {
-            for a in self.mesh.tets[e as usize] {
-                self.star[a as usize].retain(|&other| other != e);
+            for a in self.on.mesh.tets[e as usize] {
+                self.on.star[a as usize].retain(|&other| other != e);
             }
-            self.mesh.tets[e as usize] = [GONE; 4];
+            self.on.mesh.tets[e as usize] = [GONE; 4];
         }
         for t in new {
-            let e = self.mesh.tets.len() as u32;
-            self.mesh.tets.push(*t);
-            t.iter().for_each(|&a| self.star[a as usize].push(e));
+            let e = self.on.mesh.tets.len() as u32;
+            self.on.mesh.tets.push(*t);
+            t.iter().for_each(|&a| self.on.star[a as usize].push(e));
         }
     }
 
     /// Removes the edge of a tetrahedron whose ring is better without it.
     fn edges(&mut self, e: u32) -> bool {
         for [i, j] in EDGES {
-            let t = self.mesh.tets[e as usize];
+            let t = self.on.mesh.tets[e as usize];
             let (a, b) = (t[i], t[j]);
-            if self.on_surface(a, b) {
-                continue;
-            }
-            let round: Vec<u32> =
-                self.star[a as usize].iter().copied().filter(|&e| self.mesh.tets[e as usize].contains(&b)).collect();
+            let Some(round) = self.round(a, b) else { continue };
             let Some(ring) = self.ring(a, b, &round) else { continue };
-            let old = round.iter().map(|&e| self.score_of(e)).fold(f64::INFINITY, f64::min);
+            let old = self.worst(&round);
             let Some((worst, triangles)) = self.triangulated(a, b, &ring) else { continue };
             if worst > BETTER * old && worst > 0.0 {
                 let new: Vec<[u32; 4]> = triangles.iter().flat_map(|&[p, q, r]| [[p, q, r, b], [p, r, q, a]]).collect();
@@ -136,7 +126,7 @@ impl Swapping<'_> {
         }
         let mut next: Vec<[u32; 2]> = Vec::with_capacity(round.len());
         for &e in round {
-            let t = self.mesh.tets[e as usize];
+            let t = self.on.mesh.tets[e as usize];
             let rest: Vec<u32> = t.into_iter().filter(|&n| n != a && n != b).collect();
             let x = self.at([a, b, rest[0], rest[1]]);
             let positive = (x[1] - x[0]).cross(&(x[2] - x[0])).dot(&(x[3] - x[0])) > 0.0;
@@ -192,22 +182,18 @@ impl Swapping<'_> {
     fn insert(&mut self, e: u32) -> bool {
         let mut star = Star::default();
         for [i, j] in EDGES {
-            let t = self.mesh.tets[e as usize];
+            let t = self.on.mesh.tets[e as usize];
             let (a, b) = (t[i], t[j]);
-            if self.on_surface(a, b) {
-                continue;
-            }
-            let round: Vec<u32> =
-                self.star[a as usize].iter().copied().filter(|&e| self.mesh.tets[e as usize].contains(&b)).collect();
-            let old = round.iter().map(|&e| self.score_of(e)).fold(f64::INFINITY, f64::min);
+            let Some(round) = self.round(a, b) else { continue };
+            let old = self.worst(&round);
             // From a tetrahedron (.. a .. b ..) one half each: the new node in the place of a, and in that of b.
             let halves: Vec<([u32; 4], u32)> =
-                round.iter().flat_map(|&e| [a, b].map(|gone| (self.mesh.tets[e as usize], gone))).collect();
+                round.iter().flat_map(|&e| [a, b].map(|gone| (self.on.mesh.tets[e as usize], gone))).collect();
             let face = |(t, gone): &([u32; 4], u32)| {
                 let k = t.iter().position(|n| n == gone).unwrap_or(0);
-                FACES[k].map(|c| self.mesh.nodes[t[c] as usize])
+                FACES[k].map(|c| self.on.mesh.nodes[t[c] as usize])
             };
-            let mut x = 0.5 * (self.mesh.nodes[a as usize] + self.mesh.nodes[b as usize]);
+            let mut x = 0.5 * (self.on.mesh.nodes[a as usize] + self.on.mesh.nodes[b as usize]);
             star.around(halves.iter().map(face), &x);
             let mut worst = star.worst(&x);
             for _ in 0..INSERT_STEPS {
@@ -224,12 +210,12 @@ impl Swapping<'_> {
                 worst = star.worst(&x);
             }
             if worst > BETTER * old {
-                let m = self.mesh.nodes.len() as u32;
-                self.mesh.nodes.push(x);
-                self.mesh.wall.push(NO_WALL);
-                self.mesh.plane.push(0);
-                self.star.push(Vec::new());
-                self.fan.push(Vec::new());
+                let m = self.on.mesh.nodes.len() as u32;
+                self.on.mesh.nodes.push(x);
+                self.on.mesh.wall.push(NO_WALL);
+                self.on.mesh.plane.push(0);
+                self.on.star.push(Vec::new());
+                self.on.fan.push(Vec::new());
                 let new: Vec<[u32; 4]> =
                     halves.iter().map(|&(t, gone)| t.map(|n| if n == gone { m } else { n })).collect();
                 self.replace(&round, &new);
@@ -242,18 +228,18 @@ impl Swapping<'_> {
     /// Replaces a face of a tetrahedron by the edge between the two corners opposite.
     fn sides(&mut self, e: u32) -> bool {
         for f in 0..4 {
-            let t = self.mesh.tets[e as usize];
+            let t = self.on.mesh.tets[e as usize];
             let [p, q, r] = FACES[f].map(|k| t[k]);
             let a = t[f];
             if self.face(p, q, r).is_some() {
                 continue;
             }
-            let other = self.star[p as usize].iter().copied().find(|&o| {
-                let t = self.mesh.tets[o as usize];
+            let other = self.on.star[p as usize].iter().copied().find(|&o| {
+                let t = self.on.mesh.tets[o as usize];
                 o != e && t.contains(&q) && t.contains(&r)
             });
             let Some(other) = other else { continue };
-            let Some(b) = self.mesh.tets[other as usize].into_iter().find(|&n| n != p && n != q && n != r) else {
+            let Some(b) = self.on.mesh.tets[other as usize].into_iter().find(|&n| n != p && n != q && n != r) else {
                 continue;
             };
             // The face p q r is wound outward from a: (p, q, r, b) is positive.
@@ -269,7 +255,7 @@ impl Swapping<'_> {
 
     /// Takes away a flat tetrahedron with two boundary faces of one wall, if the surface gets no further off.
     fn peel(&mut self, e: u32) -> bool {
-        let t = self.mesh.tets[e as usize];
+        let t = self.on.mesh.tets[e as usize];
         let own: Vec<(usize, u32)> = (0..4)
             .filter_map(|f| {
                 let [p, q, r] = FACES[f].map(|k| t[k]);
@@ -277,45 +263,40 @@ impl Swapping<'_> {
             })
             .collect();
         let [(f, one), (g, two)] = own[..] else { return false };
-        let wall = self.faces[one as usize].1;
-        if wall == SHEET || wall == NO_WALL || self.faces[two as usize].1 != wall {
+        let wall = self.on.faces[one as usize].1;
+        if wall == SHEET || wall == NO_WALL || self.on.faces[two as usize].1 != wall {
             return false;
         }
         // Faces f and g lie opposite corners f and g; the edge between those becomes one of the surface.
-        if self.on_surface(t[f], t[g]) || self.star[t[f] as usize].len() < 2 {
+        if self.on_surface(t[f], t[g]) || self.on.star[t[f] as usize].len() < 2 {
             return false;
         }
         let rest: Vec<usize> = (0..4).filter(|k| *k != f && *k != g).collect();
         // An edge that ends with this tetrahedron would leave a node behind.
-        if rest.iter().any(|&k| self.star[t[k] as usize].len() < 2) {
+        if rest.iter().any(|&k| self.on.star[t[k] as usize].len() < 2) {
             return false;
         }
         let new: Vec<[u32; 3]> = rest.iter().map(|&k| FACES[k].map(|c| t[c])).map(|[p, q, r]| [p, r, q]).collect();
-        let old = [one, two].map(|f| self.faces[f as usize].0);
+        let old = [one, two].map(|f| self.on.faces[f as usize].0);
         let field = self.walls[usize::from(wall)].field;
-        let off = |list: &[[u32; 3]]| list.iter().map(|t| self.distance(field, t)).sum::<f64>();
-        let size = (self.mesh.nodes[t[f] as usize] - self.mesh.nodes[t[g] as usize]).norm();
+        let mean = |t: &[u32; 3]| distance(field, &t.map(|a| self.on.mesh.nodes[a as usize]))[0];
+        let off = |list: &[[u32; 3]]| list.iter().map(mean).sum::<f64>();
+        let size = (self.on.mesh.nodes[t[f] as usize] - self.on.mesh.nodes[t[g] as usize]).norm();
         if off(&new) > off(&old).max(0.02 * size) {
             return false;
         }
         self.replace(&[e], &[]);
         for f in [one, two] {
-            for a in self.faces[f as usize].0 {
-                self.fan[a as usize].retain(|&other| other != f);
+            for a in self.on.faces[f as usize].0 {
+                self.on.fan[a as usize].retain(|&other| other != f);
             }
-            self.faces[f as usize].0 = [GONE; 3];
+            self.on.faces[f as usize].0 = [GONE; 3];
         }
         for t in new {
-            let f = self.faces.len() as u32;
-            self.faces.push((t, wall));
-            t.iter().for_each(|&a| self.fan[a as usize].push(f));
+            let f = self.on.faces.len() as u32;
+            self.on.faces.push((t, wall));
+            t.iter().for_each(|&a| self.on.fan[a as usize].push(f));
         }
         true
-    }
-
-    fn distance(&self, field: &dyn Field, t: &[u32; 3]) -> f64 {
-        let x = t.map(|a| self.mesh.nodes[a as usize]);
-        let sum: f64 = self.samples.iter().map(|b| field.at(&(x[0] * b[0] + x[1] * b[1] + x[2] * b[2])).abs()).sum();
-        sum / self.samples.len() as f64
     }
 }
